@@ -454,10 +454,7 @@ fn rubbing(rig: &Rig, friction: [f64; 2], seed: u64) -> Series {
         let ([pa_pa, dpa_pas], [pb_pa, dpb_pas]) = (wave(t_s, 3.0), wave(t_s, 40.0));
         let load_n = 1300.0 + 3e4 * (x_m - 0.1);
         if step % 50 == 0 {
-            let [va_m3, vb_m3] = [
-                cylinder.dead_volume_a_m3 + cylinder.area_a_m2 * x_m,
-                cylinder.dead_volume_b_m3 + cylinder.area_b_m2 * (cylinder.stroke_m - x_m),
-            ];
+            let (va_m3, vb_m3) = (cylinder.volume_a_m3(x_m), cylinder.volume_b_m3(x_m));
             let sample = Sample {
                 x_m,
                 pa_pa,

@@ -1,15 +1,12 @@
 //! A small piece of the blind judge (`cargo bench --bench judge`): honest cylinders alone.
 
 use pitchleak::live::{Event, LineFormat, LiveConfig, Watch};
-use pitchleak::replay::{ReplayError, replay};
 use pitchleak::report::Status;
-use pitchleak::trace::TraceReader;
 use pitchleak_testkit::judge::Case;
-use pitchleak_testkit::judge::givers::{Explain, Replay, VerdictGiver};
+use pitchleak_testkit::judge::givers::{Explain, Replay, VerdictGiver, replayed};
 use pitchleak_testkit::judge::score::{Judgement, Scored};
 use pitchleak_testkit::judge::worlds::{WORLDS, World};
 use rayon::prelude::*;
-use std::io::Cursor;
 
 const DRAWS: u64 = 16;
 /// Honest traces that may stay open: leaks of 0.2 L/min beside sensors of 1 % lie near the threshold.
@@ -19,9 +16,9 @@ fn world(name: &str) -> &'static World {
     WORLDS.iter().find(|world| world.name == name).expect("there is one")
 }
 
-/// Every honest draw, at each door.
-fn honest(givers: &[&dyn VerdictGiver]) -> Vec<Vec<Scored>> {
-    let draw = |number| Case::draw(world("honest"), number, "tests", None, 60.0);
+/// Every draw of a world, by each giver.
+fn drawn(name: &str, givers: &[&dyn VerdictGiver]) -> Vec<Vec<Scored>> {
+    let draw = |number| Case::draw(world(name), number, "tests", None, 60.0);
     (0..DRAWS).into_par_iter().map(|number| draw(number).judge(givers)).collect()
 }
 
@@ -31,7 +28,7 @@ fn honest(givers: &[&dyn VerdictGiver]) -> Vec<Vec<Scored>> {
 #[cfg_attr(debug_assertions, ignore = "too slow without optimisation: run with --release")]
 fn honest_traces_are_sure_and_right_and_no_wire_is_blamed() {
     let givers: [&dyn VerdictGiver; 2] = [&Replay, &Explain];
-    let scored = honest(&givers);
+    let scored = drawn("honest", &givers);
     for (place, giver) in givers.iter().enumerate() {
         let own: Vec<&Scored> = scored.iter().map(|all| &all[place]).collect();
         let texts: Vec<&str> = own.iter().map(|one| one.text.as_str()).collect();
@@ -47,11 +44,7 @@ fn honest_traces_are_sure_and_right_and_no_wire_is_blamed() {
 #[test]
 #[cfg_attr(debug_assertions, ignore = "too slow without optimisation: run with --release")]
 fn a_leak_that_comes_and_goes_is_told_to() {
-    let draw = |number| Case::draw(world("pulses"), number, "tests", None, 60.0);
-    let scored: Vec<Scored> = (0..DRAWS)
-        .into_par_iter()
-        .map(|number| draw(number).judge(&[&Replay as &dyn VerdictGiver]).remove(0))
-        .collect();
+    let scored = drawn("pulses", &[&Replay]).concat();
     let texts: Vec<&str> = scored.iter().map(|one| one.text.as_str()).collect();
     let right = scored.iter().filter(|one| one.judgement == Judgement::Right).count();
     assert!(scored.iter().all(|one| one.judgement != Judgement::Wrong), "{texts:#?}");
@@ -64,9 +57,7 @@ fn a_leak_that_comes_and_goes_is_told_to() {
 fn what_is_named_or_ruled_out_has_its_figure() {
     (0..DRAWS).into_par_iter().for_each(|number| {
         let case = Case::draw(world("lag 50 ms"), number, "tests", None, 60.0);
-        let (trace, rig) = (case.record().0, case.rig());
-        let mut reader = TraceReader::from_stream("t", Box::new(Cursor::new(trace)), &rig).expect("a trace");
-        let report = replay(&mut reader, &rig, |_, _, _| Ok::<(), ReplayError>(())).expect("a report");
+        let report = replayed(&case.record().0, &case.rig()).expect("a trace");
         let told = report.verdict.faults.iter().map(|leak| report.estimates.leaks()[*leak].identifiable);
         let is_told = match report.verdict.status {
             Status::Sound => report.estimates.leaks().iter().all(|(_, entry)| entry.identifiable),

@@ -25,7 +25,7 @@ const REGRESSORS: usize = STEADY + 1;
 /// Those that let no oil in. What falls with the pressure that a leak takes away is the leak that opened, and no other one that does.
 const ARE_LEAKS: [bool; REGRESSORS] = [false, true, true, true, false];
 
-/// What a change may follow: time, as a meter's zero, or the pressure across a leak.
+/// How many things a change may follow: time, as a meter's zero, and the pressure across each leak.
 const FOLLOWED: usize = 4;
 
 /// The waiting blocks.
@@ -83,11 +83,12 @@ impl<T: Real> Waiting<T> {
         best.0
     }
 
-    /// Squares of the sizes in their standard deviations of changes that follow each of [`FOLLOWED`], the block `at` itself left out.
+    /// Squares of the sizes in their standard deviations of changes that follow each of these, the block `at` itself left out.
     fn contrasts(&self, at: usize) -> Option<[Option<T>; FOLLOWED]> {
-        let mut steady = [[T::zero(); STEADY]; STEADY];
-        let mut vector = [T::zero(); STEADY];
-        let mut changes = [Change::default(); FOLLOWED];
+        let mut matrix = [[T::zero(); REGRESSORS]; REGRESSORS];
+        let mut vector = [T::zero(); REGRESSORS];
+        // Of each change: its products with the steady regressors, its square, and its product with the left side.
+        let mut changes = [([T::zero(); REGRESSORS], T::zero()); FOLLOWED];
         let (mut square, mut declared, mut rows) = (T::zero(), T::zero(), T::zero());
         for (place, block) in self.blocks().iter().enumerate().filter(|(place, _)| *place != at) {
             if block.fed != [true, true] {
@@ -96,20 +97,24 @@ impl<T: Real> Waiting<T> {
             let (left, row, followed) = self.balance(block);
             for i in 0..STEADY {
                 for j in 0..=i {
-                    steady[i][j] += row[i] * row[j];
+                    matrix[i][j] += row[i] * row[j];
                 }
                 vector[i] += row[i] * left;
             }
             if place > at {
-                changes.iter_mut().zip(followed).for_each(|(change, own)| change.add(own, &row, left));
+                for ((products, with_left), own) in changes.iter_mut().zip(followed) {
+                    let others = row.iter().chain([&own]);
+                    products.iter_mut().zip(others).for_each(|(sum, other)| *sum += own * *other);
+                    *with_left += own * left;
+                }
             }
             square += left * left;
             declared += self.variance * block.time_square_s2[0];
             rows += T::one();
         }
         let freedom = rows - T::lit(REGRESSORS as f64);
-        Some(changes.map(|change| {
-            let (matrix, vector) = change.beside(&steady, &vector);
+        Some(changes.map(|(products, with_left)| {
+            (matrix[STEADY], vector[STEADY]) = (products, with_left);
             let fit = LeakFit::of(&matrix, &vector, &ARE_LEAKS);
             let (last, variance_share) = fit.last()?;
             let variance = ((square - fit.explained) / freedom).at_least(declared / rows);
@@ -124,44 +129,6 @@ impl<T: Real> Waiting<T> {
         let (pa, pb, time) = (sum(RawSum::PressureA), sum(RawSum::PressureB), sum(RawSum::Time));
         let left = sum(RawSum::ResidualA) / a + sum(RawSum::ResidualB) / b;
         (left, [time, pb - pa, pa, pb], [time, pa - pb, pa, pb])
-    }
-}
-
-/// Products of a change's column.
-#[derive(Clone, Copy)]
-struct Change<T> {
-    with_steady: [T; STEADY],
-    square: T,
-    with_left: T,
-}
-
-impl<T: Real> Default for Change<T> {
-    fn default() -> Self {
-        Self { with_steady: [T::zero(); STEADY], square: T::zero(), with_left: T::zero() }
-    }
-}
-
-impl<T: Real> Change<T> {
-    fn add(&mut self, own: T, row: &[T; STEADY], left: T) {
-        self.with_steady.iter_mut().zip(row).for_each(|(sum, value)| *sum += own * *value);
-        self.square += own * own;
-        self.with_left += own * left;
-    }
-
-    /// Normal equations of the steady regressors and this one.
-    fn beside(
-        &self,
-        steady: &[[T; STEADY]; STEADY],
-        vector: &[T; STEADY],
-    ) -> ([[T; REGRESSORS]; REGRESSORS], [T; REGRESSORS]) {
-        let entry = |i: usize, j: usize| match (i < STEADY, j < STEADY) {
-            (true, true) => steady[i][j],
-            (false, true) => self.with_steady[j],
-            (true, false) => T::zero(),
-            (false, false) => self.square,
-        };
-        let matrix = core::array::from_fn(|i| core::array::from_fn(|j| entry(i, j)));
-        (matrix, core::array::from_fn(|i| if i < STEADY { vector[i] } else { self.with_left }))
     }
 }
 

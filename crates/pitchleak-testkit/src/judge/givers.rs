@@ -97,7 +97,12 @@ impl VerdictGiver for Replay {
     }
 }
 
-fn replayed(trace: &[u8], rig: &Rig) -> Result<ReplayReport, ReplayError> {
+/// The report of `pitchleak replay`.
+///
+/// # Errors
+///
+/// Where the trace can't be read.
+pub fn replayed(trace: &[u8], rig: &Rig) -> Result<ReplayReport, ReplayError> {
     let mut reader = TraceReader::from_stream("trace", Box::new(Cursor::new(trace.to_vec())), rig)?;
     replay(&mut reader, rig, |_, _, _| Ok::<_, ReplayError>(()))
 }
