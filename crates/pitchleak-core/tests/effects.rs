@@ -399,20 +399,40 @@ fn what_grows_is_nothing_at_the_beginning_and_twice_as_large_after_twice_the_tim
     assert!((drift(60.0) - 6e-6).abs() < 1e-18 && (drift(120.0) - 1.2e-5).abs() < 1e-18);
 }
 
-/// A seal that is tighter one way leaks more the other way.
+/// Past a check valve oil goes one way, whichever way the piston moves.
 #[test]
-fn a_leak_that_depends_on_direction_turns_with_the_flows() {
+fn a_leak_that_is_larger_one_way_goes_with_the_load_pressure() {
     let (model, constants) = (Model::<f64>::paper(), EffectConstants::default());
-    for (way, speed) in [(1.0, 0.05), (-1.0, -0.05), (0.0, 0.0)] {
-        let at = Signals {
-            pa_pa: 4e6,
-            pb_pa: 1e6,
-            qa_m3s: speed * model.cylinder.area_a_m2,
-            qb_m3s: -speed * model.cylinder.area_b_m2,
-            ..Signals::default()
-        };
-        let leak = Effect::InternalLeakDirection.unit_term(&at, &model, &constants).chamber_a_m3s;
-        assert!((leak - way * 3e6).abs() < 1.0, "{leak}");
+    for (pa_pa, pb_pa) in [(4e6, 1e6), (1e6, 4e6)] {
+        let at = Signals { pa_pa, pb_pa, v_mps: -0.05, ..Signals::default() };
+        let leak = Effect::InternalLeakOneWay.unit_term(&at, &model, &constants);
+        assert!(
+            (leak.chamber_a_m3s - 3e6).abs() < 1e-3 && (leak.chamber_b_m3s + 3e6).abs() < 1e-3,
+            "{leak:?}"
+        );
+    }
+}
+
+/// A seal that is tighter one way leaks more the other way: as the piston moves, whatever leaks past the meters meanwhile.
+#[test]
+fn a_leak_that_depends_on_direction_turns_with_the_motion() {
+    let constants = EffectConstants::default();
+    let leaking = PerLeak { internal: 1e-10, external_a: 2e-11, external_b: 3e-11 };
+    for leaks_m3spa in [PerLeak::default(), leaking] {
+        let model = Model::<f64> { leaks_m3spa, ..Model::paper() };
+        for (way, speed) in [(1.0, 0.05), (-1.0, -0.05), (0.0, 0.0)] {
+            let (pa_pa, pb_pa) = (4e6, 1e6);
+            let past = leaks_m3spa.internal * (pa_pa - pb_pa);
+            let at = Signals {
+                pa_pa,
+                pb_pa,
+                qa_m3s: speed * model.cylinder.area_a_m2 + past + leaks_m3spa.external_a * pa_pa,
+                qb_m3s: -speed * model.cylinder.area_b_m2 - past + leaks_m3spa.external_b * pb_pa,
+                ..Signals::default()
+            };
+            let leak = Effect::InternalLeakDirection.unit_term(&at, &model, &constants).chamber_a_m3s;
+            assert!((leak - way * 3e6).abs() < 1.0, "{leak}");
+        }
     }
 }
 

@@ -13,6 +13,8 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use std::fmt::Write;
 
+/// What the table has had only since then: a rig that a draw has found stays the same rig.
+const LATER: [Effect; 1] = [Effect::InternalLeakOneWay];
 /// Sizes of effects, in what the same trace of a sound rig says it could have shown (five standard deviations): even in their logarithm.
 const MULTIPLES: (f64, f64) = (2.0, 20.0);
 /// No more of what an effect may be at all.
@@ -49,12 +51,22 @@ pub struct Answer {
 impl Case {
     /// Rig `number` of a seed, with `effects` missing.
     pub fn draw(seed: u64, number: u64, effects: usize) -> Self {
+        Self::draw_of(Effect::ALL, seed, number, effects)
+    }
+
+    /// The same as it was drawn before the table had [`LATER`].
+    pub fn draw_before(seed: u64, number: u64, effects: usize) -> Self {
+        let table: Vec<Effect> = Effect::ALL.iter().copied().filter(|one| !LATER.contains(one)).collect();
+        Self::draw_of(&table, seed, number, effects)
+    }
+
+    fn draw_of(table: &[Effect], seed: u64, number: u64, effects: usize) -> Self {
         let seed = seed.wrapping_mul(1_000_003).wrapping_add(10 * number + effects as u64);
         let random = &mut ChaCha8Rng::seed_from_u64(seed);
         let wind = *[WindCase::Mps13, WindCase::Mps21, WindCase::Mps30].choose(random).expect("is not empty");
         let accuracy = *[1e-3, 3e-3, 1e-2].choose(random).expect("is not empty");
         let rate_hz = *[50.0, 100.0, 200.0].choose(random).expect("is not empty");
-        let missing = Effect::ALL.sample(random, effects).copied().collect::<Vec<_>>();
+        let missing = table.sample(random, effects).copied().collect::<Vec<_>>();
         let (low, high) = (MULTIPLES.0.ln(), MULTIPLES.1.ln());
         let mut size = |effect: Effect| {
             let sign = if effect.spec().lower < 0.0 && random.random_bool(0.5) { -1.0 } else { 1.0 };

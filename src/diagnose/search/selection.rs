@@ -168,7 +168,9 @@ impl Selection<'_> {
         let chi2_drop = trial.score.chi2_drop;
         let dispersion = fit.dispersion(fit.free.chi2 - chi2_drop);
         let p_value = statistics::chi2_p(chi2_drop / dispersion, 1.0);
-        let more = chi2_drop + SIGNIFICANT_SIGMA.powi(2) * dispersion;
+        // A column may turn where the model stands, which is elsewhere once the effect is there.
+        let gained = chi2_drop.max(-next.beyond(fit).chi2);
+        let more = gained + SIGNIFICANT_SIGMA.powi(2) * dispersion;
         let named = [fit.active(), &[trial.score.term]].concat();
         let is_below_unlisted =
             strongest_unlisted(fit, &fit.free, &named).is_some_and(|(_, unlisted)| unlisted > more);

@@ -6,7 +6,7 @@ use crate::diagnose::data::{Declared, Motion, Series};
 use crate::diagnose::equation::PerEquation;
 use crate::diagnose::thresholds::{NEGLIGIBLE_SHARE, SIGNIFICANT_SIGMA, TURNED};
 use pitchleak_core::effects::{ActiveEffect, EffectConstant, EffectConstants, EffectKind};
-use pitchleak_core::{Effect, EffectSet, Model, PerLeak, Sensors, Signals, Terms};
+use pitchleak_core::{Effect, EffectSet, Leak, Model, PerLeak, Sensors, Signals, Terms};
 
 /// The values around which the regression is linear.
 #[derive(Clone, Debug)]
@@ -124,7 +124,7 @@ impl Linearisation {
     }
 
     /// What one unit of a term adds to [`Self::residual`] at corrected readings: a sensor's error also spoils what
-    /// the physical effects found so far are computed from.
+    /// the physical effects found so far are computed from, and a leak the direction that is told from the flows.
     pub(crate) fn unit_term(
         &self,
         term: Term,
@@ -139,11 +139,19 @@ impl Linearisation {
         if self.effects.iter().all(|one| !is_physical(one.effect.spec().kind)) {
             return own;
         }
+        let known = |at: &Signals<f64>, model: &Model<f64>| self.effects.terms(at, model, is_physical);
         let step = NEGLIGIBLE_SHARE * term.usual_size();
+        if let Some(leak) = Leak::ALL.into_iter().find(|leak| Term::of_leak(*leak) == term) {
+            let with = |by: f64| {
+                let mut model = self.model;
+                model.leaks_m3spa[leak] += by;
+                model
+            };
+            return own.plus(0.5 / step, known(at, &with(step)).plus(-1.0, known(at, &with(-step))));
+        }
         let above = term.read(step, at).filter(|above| !is_same(above, at));
         let Some((above, below)) = above.zip(term.read(-step, at)) else { return own };
-        let known = |at: &Signals<f64>| self.effects.terms(at, &self.model, is_physical);
-        own.plus(-0.5 / step, known(&above).plus(-1.0, known(&below)))
+        own.plus(-0.5 / step, known(&above, &self.model).plus(-1.0, known(&below, &self.model)))
     }
 
     /// What a unit of a constant adds, at the size that its effect has.

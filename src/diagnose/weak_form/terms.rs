@@ -150,10 +150,14 @@ impl Term {
         }
     }
 
+    /// A leak that shows clearly: 0.3 L/min at 50 bar, m³/s/Pa.
+    const USUAL_LEAK_M3SPA: f64 = 1e-12;
+
     /// A size that shows clearly.
     pub(super) fn usual_size(self) -> f64 {
         match self {
             Self::Effect(effect) => effect.spec().default_size,
+            Self::Internal | Self::ExternalA | Self::ExternalB => Self::USUAL_LEAK_M3SPA,
             Self::Unlisted(Unlisted::HiddenPlayA | Unlisted::HiddenPlayB) => Unlisted::USUAL_PLAY_PA,
             _ => Unlisted::USUAL_BEND,
         }

@@ -199,12 +199,17 @@ effects! {
         "Compare the leak over the next traces, record the oil's temperature, and inspect the seal if that stays."
         "The same hold at the beginning and at the end, and the meters' zeros before and after."
     InternalLeakDirection "internal_leak_direction" ["m3/(s*Pa)"] InternalLeak -1e-9 .. 1e-9, 5e-12;
-        term |at, model, constants| past_piston(flow_direction(at, &model.cylinder, constants) * (at.pa_pa - at.pb_pa));
+        term |at, model, constants| past_piston(flow_direction(at, model, constants) * (at.pa_pa - at.pb_pa));
         given [SlipSpeed];
         shares [FlowA, FlowB];
-        "The piston seal is tighter one way than the other (a lip seal in one direction, a check valve in the piston): positive, the leak is larger while extending."
+        "The piston seal is tighter while the piston moves one way than the other (a lip that oil is dragged under): positive, the leak is larger while extending."
         "Check that the seal is mounted the right way round and its lip is whole."
         "Strokes both ways at constant speed and load: the leak differs by twice the value named."
+    InternalLeakOneWay "internal_leak_one_way" ["m3/(s*Pa)"] InternalLeak -1e-9 .. 1e-9, 5e-12;
+        term |at, _, _| past_piston((at.pa_pa - at.pb_pa).abs());
+        "Pressure drives more oil past the piston one way than the other (a check valve in it or beside it, a lip seal that is lifted from one side): positive, more from A to B."
+        "Inspect the check valves in and beside the piston, and whether its seal is mounted the right way round."
+        "Holds at the same load pressure both ways: the leak differs by twice the value named."
     ViscousFriction "viscous_friction" ["N*s/m"] Force 0.0 .. 1e6, 1.5e3;
         term |at, _, _| force(at.v_mps);
         "Seals and guides resist in proportion to speed."

@@ -51,6 +51,8 @@ pub struct Physics {
     pub relief: f64,
     /// Leak past the piston while extending only, per Pa.
     pub one_way: f64,
+    /// Leak past the piston from A to B only, per Pa: past a check valve.
+    pub checked: f64,
     /// Leak past the piston that grows with the time, per Pa and s.
     pub growing: f64,
     /// Friction with the cube of the speed.
@@ -201,6 +203,7 @@ impl Plant {
             + own.steep_leak * pl.signum() * pl.abs().powf(1.5)
             + own.relief * ((pl.abs() - 2e6).max(0.0)) * pl.signum()
             + own.one_way * if at.v > 0.0 { pl } else { 0.0 }
+            + own.checked * pl.max(0.0)
             + own.growing * t * pl;
         let (va, vb) = (self.area_a * at.x.max(1e-4), self.area_b * (self.stroke - at.x).max(1e-4));
         let bulk = |p: f64| self.bulk * (1.0 + own.stiffening * p);

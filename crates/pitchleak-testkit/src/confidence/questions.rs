@@ -144,6 +144,23 @@ pub fn outside(count: usize) -> Vec<Case> {
     all.filter(|case| case.truth.is_empty()).take(count).collect()
 }
 
+/// Leaks past a check valve in the piston.
+pub fn checked(count: usize) -> Vec<Case> {
+    let case = |number: usize| {
+        let size = SIZES[number % 4];
+        let mut case = Case {
+            size,
+            accuracy: [1e-3, 3e-3, 1e-2][number % 3],
+            rest: [Rest::Never, Rest::Half][number / 2 % 2],
+            ..Case::sound("leak past a check valve", 17_000 + number as u64)
+        };
+        case.physics.checked = 2e-11 * size * size;
+        case.truth = vec![("internal_leak_one_way", case.physics.checked / 2.0)];
+        case
+    };
+    (0..count).map(case).collect()
+}
+
 /// Single effects that [`two`] does not have: those without a truth stand in no table.
 fn single(count: usize) -> Vec<Case> {
     let case = |number: usize| {
