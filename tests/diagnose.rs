@@ -746,3 +746,29 @@ fn a_gas_of_unknown_precharge_is_no_larger_than_without_one() {
     let gas = answer.effects.iter().find(|one| one.id == "accumulator_a").expect("is named");
     assert!((0.3 * gas.value..=1.1 * gas.value).contains(&gas.std), "{gas:?}");
 }
+
+/// How slowly friction turns is no news of another friction: one that grows near standstill, which may turn as slowly, stood in its place for
+/// sure, beside a leak that was named first.
+#[test]
+fn friction_that_turns_slowly_is_none_that_grows_near_standstill() {
+    let leaks = PerLeak { internal: 1.4e-11, ..PerLeak::default() };
+    for (wind, slip_speed_mps, accuracy, seed) in
+        [(WindCase::Mps13, 5e-4, 1e-3, 1), (WindCase::Mps30, 1.3e-3, 3e-3, 3)]
+    {
+        let constants = EffectConstants { slip_speed_mps, ..EffectConstants::default() };
+        let mut effects = EffectSet::default();
+        effects.set(Effect::CoulombFriction, 380.0, constants).expect("is in bounds");
+        effects.set(Effect::InternalLeakOneWay, 8e-12, constants).expect("is in bounds");
+        let mut rig = Rig::paper();
+        rig.instruments = rig.instruments.with_accuracy(accuracy);
+        let answer = ask(leaking_in_wind(wind, leaks, effects, 90.0, &rig, seed), &rig);
+        let friction = answer.effects.iter().find(|one| one.id == "coulomb_friction");
+        assert!(
+            friction.is_some_and(|own| (own.value - 380.0).abs() < 4.0 * own.std),
+            "{:?}",
+            answer.effects
+        );
+        let others = answer.effects.iter().filter(|one| one.id.ends_with("friction") && one.confident);
+        assert!(others.into_iter().all(|one| one.id == "coulomb_friction"), "{:?}", answer.effects);
+    }
+}

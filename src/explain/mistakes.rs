@@ -2,7 +2,7 @@
 
 use super::readings::{Mistake, Of};
 use super::scales;
-use super::table::{Entry, Kind};
+use super::table::{AREA, Entry, Kind};
 use crate::units::{Dimension, Unit};
 
 /// Prior share of each exchange of wires or turned sign: once in a thousand recordings. A guess.
@@ -80,8 +80,8 @@ pub(super) fn mistakes() -> Vec<Entry> {
 }
 
 fn entry(((id, mistake, text), share): (Row, f64)) -> Entry {
-    Entry { mistake: Some(mistake), ..Entry::new(id, Kind::Wiring, share, text) }
-        .remedy("Look at the wiring and the columns' names.", None)
+    let remedy = if mistake.is_of_rig() { AREA } else { "Look at the wiring and the columns' names." };
+    Entry { mistake: Some(mistake), ..Entry::new(id, Kind::Wiring, share, text) }.remedy(remedy, None)
 }
 
 /// Factors between any two of these units, and a slipped decimal point.

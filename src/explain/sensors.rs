@@ -46,6 +46,11 @@ impl Column {
 }
 
 impl Mistake {
+    /// Whether the rig file is mistaken, and no reading.
+    pub(crate) fn is_of_rig(self) -> bool {
+        matches!(self, Self::AreasExchanged | Self::Area(..))
+    }
+
     pub(crate) fn sensors(self) -> &'static [Signal] {
         match self {
             Self::FlowsExchanged | Self::FlowsExchangedAndTurned => Of::Flows.sensors(),

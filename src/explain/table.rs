@@ -96,6 +96,9 @@ impl Kind {
     }
 }
 
+/// What to do about an area that is not as declared.
+pub(super) const AREA: &str = "Measure piston and rod, or compare the data sheet.";
+
 impl Entry {
     pub(super) fn new(id: &'static str, kind: Kind, share: f64, text: &'static str) -> Self {
         Self { id, kind, share, free: Vec::new(), mistake: None, text, remedy: "", mends: None, alike: &[] }
@@ -254,7 +257,6 @@ pub(super) fn departures() -> Vec<Entry> {
     const METER: &str = "Compare the meter with the piston's travel over a long stroke.";
     const BOTH_WAYS: &str = "Compare the meter with the piston's travel over a long stroke, out and in.";
     const CLOCK: &str = "Compare the clocks and filters of flow meters, position and pressures.";
-    const AREA: &str = "Measure piston and rod, or compare the data sheet.";
     // Meters come with a certificate; an area is a rod of another size, or a slip.
     let (late_s, very_late_s, meter_gain, one_way, gain, gross) = (0.1, 1.0, 0.02, 0.01, 0.05, 0.01);
     let entry = |id, share, text| Entry::new(id, Kind::Departure, share, text);
@@ -267,7 +269,7 @@ pub(super) fn departures() -> Vec<Entry> {
             .alike(&["position_lag"]),
         entry("flow_lag_a", UNCOMMON, "flow meter A lags").free(C::LagA, late_s).remedy(CLOCK, None),
         entry("flow_lag_b", UNCOMMON, "flow meter B lags").free(C::LagB, late_s).remedy(CLOCK, None),
-        entry("flow_lag_gross", 0.5 * RARE, "both flow meters lag by seconds")
+        entry("flow_lag_gross", 0.5 * RARE, "both flow meters lag far behind")
             .free(C::Lags, very_late_s)
             .remedy(CLOCK, None),
         entry("flow_gain_a", UNCOMMON, "flow meter A's gain is off")

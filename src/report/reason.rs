@@ -3,7 +3,7 @@
 use super::Findings;
 use super::statement::{interval, join};
 use crate::channels::ChannelFaultKind;
-use crate::explain::{Decision, Explained, WIRING_DOUBT};
+use crate::explain::{Decision, Explained, Mistake, WIRING_DOUBT};
 use crate::signal::Signal;
 use crate::units::readable;
 use crate::wiring::remedy;
@@ -108,7 +108,7 @@ pub(super) fn contradictions(findings: &Findings<'_>) -> Vec<Reason> {
 /// The mistake of wiring that explains the trace, with the lines that mend it.
 fn wiring(findings: &Findings<'_>) -> Option<Reason> {
     if let Some(found) = &findings.wiring {
-        let reason = Reason::new(ReasonId::Wiring, found.suggestion.clone(), remedy(&found.columns));
+        let reason = Reason::new(ReasonId::Wiring, found.suggestion.clone(), found.remedy());
         return Some(reason.against(&found.sensors));
     }
     // What leaves as much as that is no explanation.
@@ -117,7 +117,8 @@ fn wiring(findings: &Findings<'_>) -> Option<Reason> {
     let best = decision.explanations.iter().find(|one| one.wiring)?;
     let percent = 100.0 * decision.wiring;
     let text = format!("the trace is explained if {} ({percent:.0} %)", best.cause);
-    Some(Reason::new(ReasonId::Wiring, text, remedy(&best.columns)).against(&best.sensors))
+    let table = best.mistake.map_or("columns", Mistake::table);
+    Some(Reason::new(ReasonId::Wiring, text, remedy(table, &best.columns)).against(&best.sensors))
 }
 
 /// What the trace says too little of.

@@ -1,6 +1,7 @@
 use super::*;
 use crate::channels::{ChannelFault, ChannelFaultKind};
-use crate::explain::{Belief, Decision, Explained, Note};
+use crate::explain::{Belief, Decision, Explained, Mistake, Note};
+use crate::rig::{ColumnMap, Rig};
 use crate::signal::Signal;
 use crate::times::{Clock, TimeFormat, Zone};
 use crate::wiring::Wiring;
@@ -357,6 +358,7 @@ fn channels_come_before_wiring_and_that_before_what_follows_from_it() {
         residual_before: Some(29.0),
         residual_after: Some(1.0),
         columns: vec!["qa = \"qb_lpm\"".to_owned()],
+        cylinder: Vec::new(),
         sensors: vec![Signal::FlowA, Signal::FlowB],
         alternatives: Vec::new(),
     };
@@ -479,4 +481,24 @@ fn a_long_trace_tells_times_by_its_clock_or_in_hours() {
     without.trace.duration_s = 50_000.0;
     let text = without.verdict().text;
     assert!(text.contains("Earlier: internal leak of 0.50 L/min from 1 h 00 min to 2 h 01 min."), "{text}");
+}
+
+/// Where nothing is left of the readings as declared, a mistake is not the explanation for that alone: chambers were exchanged, for sure
+/// and 14 times louder than noise, where the rig file had both areas the wrong way round.
+#[test]
+fn a_mistake_that_leaves_more_than_noise_explains_nothing() {
+    let mistake = Mistake::ChambersExchanged;
+    let named = |before: Option<f64>, after: f64| {
+        let chambers =
+            Explained { mistake: Some(mistake), ..explained("exchanged_chambers", "exchanged", 0.99) };
+        let decision = Decision {
+            explanations: vec![chambers],
+            wiring: 0.99,
+            residuals: [before, Some(after)],
+            ..decision(PerLeak::default())
+        };
+        Wiring::of(&decision, &ColumnMap::new(), &Rig::paper()).is_some()
+    };
+    assert!(named(None, 1.1) && named(Some(29.0), 1.1) && named(Some(29.0), 3.0));
+    assert!(!named(None, 14.0) && !named(Some(29.0), 14.0));
 }

@@ -1,4 +1,4 @@
-//! What mends a mistake: in words, and as lines of `[columns]`.
+//! What mends a mistake: in words, and as lines of the rig file.
 
 use crate::explain::{Mistake, Of};
 use crate::rig::{ColumnMap, ForeignColumn, Rig};
@@ -34,7 +34,7 @@ impl Mistake {
         unit.map_or_else(String::new, |unit| format!(" ({})", unit.text))
     }
 
-    /// The lines of `[columns]` that mend it; none where a column cannot say it.
+    /// The lines of its table of the rig file that mend it; none where none can say it.
     pub(super) fn mending(self, columns: &ColumnMap, rig: &Rig) -> Vec<String> {
         let line = |signal: Signal, from: Signal, change: &dyn Fn(ForeignColumn) -> ForeignColumn| {
             let column = without_arithmetic(change(columns.get(&from)?.clone()), signal);
@@ -48,6 +48,7 @@ impl Mistake {
             let both = pairs.iter().flat_map(|(a, b)| [line(*a, *b, &change), line(*b, *a, &change)]);
             both.flatten().collect::<Vec<_>>()
         };
+        let areas_m2 = [rig.cylinder.area_a_m2, rig.cylinder.area_b_m2];
         match self {
             Self::PressuresExchanged => exchanged(&[PRESSURES], 1.0),
             Self::FlowsExchanged => exchanged(&[FLOWS], 1.0),
@@ -60,8 +61,15 @@ impl Mistake {
             Self::Factor(of, factor) => in_unit_each(of.sensors(), factor, &line),
             Self::Clock(factor) => in_unit_each(&[Signal::Time], factor, &line),
             Self::Absolute(of) => each(of.sensors(), &|column| linear(column, 1.0, -ATMOSPHERE_PA)),
-            Self::LostSign(_) | Self::AreasExchanged | Self::Area(..) => Vec::new(),
+            Self::LostSign(_) => Vec::new(),
+            Self::AreasExchanged => vec![area(0, areas_m2[1]), area(1, areas_m2[0])],
+            Self::Area(side, factor) => vec![area(side, areas_m2[side] / factor)],
         }
+    }
+
+    /// The table of the rig file in which they stand.
+    pub(crate) fn table(self) -> &'static str {
+        if self.is_of_rig() { "cylinder" } else { "columns" }
     }
 }
 
@@ -88,6 +96,11 @@ impl Of {
             Self::Flows => "qa and qb",
         }
     }
+}
+
+/// The line of an area.
+fn area(side: usize, area_m2: f64) -> String {
+    format!("{} = \"{} cm^2\"", ["area_a", "area_b"][side], number(1e4 * area_m2))
 }
 
 fn scaled(what: &str, factor: f64) -> String {
@@ -164,6 +177,27 @@ mod tests {
         assert_eq!(line, "qa = { name = \"Q1\", unit = \"L/min\" }");
         let (line, _) = mended(Mistake::Factor(Of::FlowA, 10.0), &columns("L/min", 1.0, 0.0));
         assert_eq!(line, "qa = { name = \"Q1\", unit = \"L/min\", scale = 0.1 }");
+    }
+
+    /// Oil knows no names: a rig file with both areas exchanged, or one of them in another unit, is mended where it is wrong.
+    #[test]
+    fn areas_are_mended_in_the_cylinder() {
+        let rig = Rig::paper();
+        let [a, b] = [rig.cylinder.area_a_m2, rig.cylinder.area_b_m2];
+        let cases = [(Mistake::AreasExchanged, [b, a]), (Mistake::Area(1, 10.0), [a, b / 10.0])];
+        for (mistake, expected) in cases {
+            let mut mended = rig.to_toml();
+            for line in mistake.mending(&ColumnMap::new(), &rig) {
+                let key = line.split(' ').next().unwrap();
+                let old = mended.lines().find(|old| old.starts_with(key)).unwrap().to_owned();
+                mended = mended.replace(&old, &line);
+            }
+            let cylinder = Rig::parse(&mended, "rig.toml").unwrap().cylinder;
+            for (found, expected) in [cylinder.area_a_m2, cylinder.area_b_m2].into_iter().zip(expected) {
+                assert!((found / expected - 1.0).abs() < 1e-4, "{mistake:?}: {mended}");
+            }
+            assert_eq!(mistake.table(), "cylinder");
+        }
     }
 
     proptest! {

@@ -27,8 +27,10 @@ pub struct Wiring {
     pub residual_before: Option<f64>,
     /// Size of the residual with the mistake mended, in standard deviations of the declared noise.
     pub residual_after: Option<f64>,
-    /// Lines for `[columns]` of the rig file that mend the first; none where the recording has to be mended.
+    /// Lines for `[columns]` of the rig file that mend the first; none where the recording has to be mended, or the cylinder.
     pub columns: Vec<String>,
+    /// Lines for its `[cylinder]` that do.
+    pub cylinder: Vec<String>,
     /// Sensors whose readings carry the first.
     pub sensors: Vec<Signal>,
     /// Mistakes that explain the trace as well.
@@ -45,7 +47,10 @@ impl Wiring {
         let mistake = first.mistake?;
         let residuals = decision.residuals[0].zip(decision.residuals[1]);
         let is_motion = matches!(mistake, crate::explain::Mistake::LostSign(_));
-        if !is_motion && residuals.is_some_and(|(before, after)| after > NEAR && before < FALLS * after) {
+        let [before, after] = decision.residuals;
+        let leaves_much =
+            after.is_some_and(|after| after > NEAR && before.is_none_or(|before| before < FALLS * after));
+        if !is_motion && leaves_much {
             return None;
         }
         let mut names = vec![mistake.text()];
@@ -56,11 +61,14 @@ impl Wiring {
             }
         }
         let residuals = residuals.filter(|_| !is_motion);
+        let lines = mistake.mending(columns, rig);
+        let (columns, cylinder) = if mistake.is_of_rig() { (vec![], lines) } else { (lines, vec![]) };
         Some(Self {
             suggestion: suggestion(first, &names, residuals),
             residual_before: residuals.map(|(before, _)| before),
             residual_after: residuals.map(|(_, after)| after),
-            columns: mistake.mending(columns, rig),
+            columns,
+            cylinder,
             sensors: mistake.sensors().to_vec(),
             alternatives: names.split_off(1),
         })
@@ -68,17 +76,31 @@ impl Wiring {
 
     /// It in one sentence, without a full stop.
     pub fn sentence(&self) -> String {
-        format!("{}; {}", self.suggestion, remedy(&self.columns))
+        format!("{}; {}", self.suggestion, self.remedy())
+    }
+
+    /// The table of the rig file, and the lines in it, that mend it; none where the recording has to be mended.
+    pub fn mending(&self) -> Option<(&'static str, &[String])> {
+        let tables = [("columns", &self.columns[..]), ("cylinder", &self.cylinder[..])];
+        tables.into_iter().find(|(_, lines)| !lines.is_empty())
+    }
+
+    /// What to do about it.
+    pub(crate) fn remedy(&self) -> String {
+        self.mending().map_or_else(|| remedy("columns", &[]), |(table, lines)| remedy(table, lines))
     }
 }
 
-/// What to do about a mistake that these lines of `[columns]` mend; none where the recording has to be.
-pub(crate) fn remedy(columns: &[String]) -> String {
-    const CHECK: &str = "check how the columns are wired and recorded";
-    if columns.is_empty() {
-        return format!("{CHECK}, and record anew");
+/// What to do about a mistake that these lines of a table of the rig file mend; none where the recording has to be mended.
+pub(crate) fn remedy(table: &str, lines: &[String]) -> String {
+    let check = match table {
+        "cylinder" => "compare both areas in the rig file with the data sheet",
+        _ => "check how the columns are wired and recorded",
+    };
+    if lines.is_empty() {
+        return format!("{check}, and record anew");
     }
-    format!("{CHECK}; where that is so, mend it in the rig file: [columns] {}", columns.join("; "))
+    format!("{check}; where that is so, mend it in the rig file: [{table}] {}", lines.join("; "))
 }
 
 fn suggestion(first: &Explained, names: &[String], residuals: Option<(f64, f64)>) -> String {
@@ -101,7 +123,7 @@ fn figure(residual: f64) -> String {
 }
 
 impl Decision {
-    /// With the lines of `[columns]` that mend mistakes of wiring, of a trace that was read by `columns`.
+    /// With the lines of the rig file that mend mistakes of wiring, of a trace that was read by `columns`.
     #[must_use]
     pub fn read_by(mut self, columns: &ColumnMap, rig: &Rig) -> Self {
         for one in &mut self.explanations {

@@ -148,6 +148,7 @@ impl Refused {
             residual_before: None,
             residual_after: None,
             columns: first.mistake.mending(columns, &self.rig),
+            cylinder: Vec::new(),
             sensors: first.mistake.sensors().to_vec(),
             alternatives: names.split_off(1),
         })

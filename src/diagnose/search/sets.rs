@@ -40,6 +40,24 @@ impl Exchange {
         self.new.len() == self.gone.len() && self.new.iter().all(|(term, _)| self.gone.contains(term))
     }
 
+    /// The same, each new law with the constants of the one that goes where it has them as well: how slowly friction turns is no news of
+    /// another friction.
+    fn inheriting(mut self, fit: &Fit<'_>) -> Self {
+        let fitted = |term: &usize| {
+            let effect = fit.problem.terms[*term].effect();
+            effect.into_iter().flat_map(|effect| effect.fitted_constants())
+        };
+        let is_known = |term: &&usize| fit.constants(**term) != fit.problem.usual(**term);
+        for (term, constants) in &mut self.new {
+            for gone in self.gone.iter().filter(is_known).filter(|gone| *gone != term) {
+                for own in fitted(term).filter(|own| fitted(gone).any(|other| other == *own)) {
+                    *constants = constants.with(own, fit.constants(*gone).get(own));
+                }
+            }
+        }
+        self
+    }
+
     /// By how much the set is the worse one: twice the ln of the odds against it, where the true readings are as likely anywhere on what the
     /// model allows.
     fn worse(&self, dispersion: f64) -> f64 {
@@ -120,7 +138,7 @@ fn nearest(all: &Selection<'_>, progress: Progress<'_>) -> Vec<Exchange> {
     };
     let near = some_of_each(subsets(&named).into_iter().map(&mut in_place_of).collect(), dispersion);
     let own_leaks = below_zero(fit);
-    near.into_iter().filter_map(|one| fitted(fit, own_leaks, one, progress)).collect()
+    near.into_iter().filter_map(|one| fitted(fit, own_leaks, one.inheriting(fit), progress)).collect()
 }
 
 /// The most exchanges that are fitted: the nearest in each place, the second in each, and so on. One effect with many rivals leaves room for

@@ -117,10 +117,10 @@ fn to_do(report: &CheckReport) -> Markup {
             Finding::Broken => ol {
                 @for fault in &report.channels { li { (capital(&fault.text)) ". " strong { (capital(fault.suggestion)) "." } } }
                 @if let Some(wiring) = &report.wiring {
-                    li { (capital(&wiring.suggestion)) ". " strong { @if wiring.columns.is_empty() {
-                        "Check how the columns are wired and recorded."
+                    li { (capital(&wiring.suggestion)) ". " strong { @if let Some((table, lines)) = wiring.mending() {
+                        "Where that is so, mend it in the rig file: " code { "[" (table) "] " (lines.join("; ")) }
                     } @else {
-                        "Where that is so, mend it in the rig file: " code { "[columns] " (wiring.columns.join("; ")) }
+                        "Check how the columns are wired and recorded."
                     } } }
                 }
                 @if let Some(text) = misfit(&report.verdict) { li { (prose(&text)) } }

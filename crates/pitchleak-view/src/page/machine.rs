@@ -124,9 +124,9 @@ pub fn channels(faults: &[ChannelFault], wiring: Option<&Wiring>) -> Markup {
 fn mistake(wiring: &Wiring) -> Markup {
     html! {
         p { strong { "Check the wiring: " } (prose(&wiring.suggestion)) "." }
-        @if !wiring.columns.is_empty() {
+        @if let Some((table, lines)) = wiring.mending() {
             p { "Where that is so, this in the rig file mends it:" }
-            pre { "[columns]\n" @for line in &wiring.columns { (line) "\n" } }
+            pre { "[" (table) "]\n" @for line in lines { (line) "\n" } }
         }
     }
 }

@@ -85,11 +85,9 @@ impl CheckText<'_> {
         let Some(wiring) = &self.report.wiring else { return };
         let (caution, reset) = self.palette.caution();
         let _ = writeln!(out, "\n{caution}Check the wiring: {}{reset}", wiring.suggestion);
-        if wiring.columns.is_empty() {
-            return;
-        }
-        let _ = writeln!(out, "Where that is so, this in the rig file mends it:\n    [columns]");
-        for line in &wiring.columns {
+        let Some((table, lines)) = wiring.mending() else { return };
+        let _ = writeln!(out, "Where that is so, this in the rig file mends it:\n    [{table}]");
+        for line in lines {
             let _ = writeln!(out, "    {line}");
         }
     }

@@ -203,12 +203,12 @@ fn short(value: f64) -> String {
 /// Wiring comes before any verdict: what the channels say is wrong.
 fn write_wiring(out: &mut String, wiring: &Wiring) {
     let _ = writeln!(out, "wiring: {}", wiring.suggestion);
-    if wiring.columns.is_empty() {
+    let Some((table, lines)) = wiring.mending() else {
         out.push_str("Mend the recording; until then no effect is worth looking for.\n");
         return;
-    }
-    out.push_str("If so, mend it in the rig file and diagnose again:\n\n  [columns]\n");
-    wiring.columns.iter().for_each(|line| _ = writeln!(out, "  {line}"));
+    };
+    let _ = writeln!(out, "If so, mend it in the rig file and diagnose again:\n\n  [{table}]");
+    lines.iter().for_each(|line| _ = writeln!(out, "  {line}"));
 }
 
 /// The constants of its law, in people's units.
