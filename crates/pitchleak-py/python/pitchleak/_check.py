@@ -77,7 +77,7 @@ class Wiring:
     residual_after: float | None
     """The same with the mistake mended."""
     columns: tuple[str, ...] = ()
-    """Lines for ``[columns]`` of the rig file that mend it; none where the recording has to be mended, or the cylinder."""
+    """Lines for ``[columns]`` of the rig file that mend it; none where the recording has to be mended, or the rig."""
     cylinder: tuple[str, ...] = ()
     """Lines for its ``[cylinder]`` that do."""
     alternatives: tuple[str, ...] = ()
