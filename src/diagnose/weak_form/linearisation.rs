@@ -139,19 +139,22 @@ impl Linearisation {
         if self.effects.iter().all(|one| !is_physical(one.effect.spec().kind)) {
             return own;
         }
-        let known = |at: &Signals<f64>, model: &Model<f64>| self.effects.terms(at, model, is_physical);
         let step = NEGLIGIBLE_SHARE * term.usual_size();
         if let Some(leak) = Leak::ALL.into_iter().find(|leak| Term::of_leak(*leak) == term) {
-            let with = |by: f64| {
+            if self.effects.iter().all(|one| !one.effect.spec().kind.is_leak()) {
+                return own;
+            }
+            let known = |by: f64| {
                 let mut model = self.model;
                 model.leaks_m3spa[leak] += by;
-                model
+                self.effects.terms(at, &model, EffectKind::is_leak)
             };
-            return own.plus(0.5 / step, known(at, &with(step)).plus(-1.0, known(at, &with(-step))));
+            return own.plus(0.5 / step, known(step).plus(-1.0, known(-step)));
         }
         let above = term.read(step, at).filter(|above| !is_same(above, at));
         let Some((above, below)) = above.zip(term.read(-step, at)) else { return own };
-        own.plus(-0.5 / step, known(&above, &self.model).plus(-1.0, known(&below, &self.model)))
+        let known = |at: &Signals<f64>| self.effects.terms(at, &self.model, is_physical);
+        own.plus(-0.5 / step, known(&above).plus(-1.0, known(&below)))
     }
 
     /// What a unit of a constant adds, at the size that its effect has.
