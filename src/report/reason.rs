@@ -108,7 +108,7 @@ pub(super) fn contradictions(findings: &Findings<'_>) -> Vec<Reason> {
 /// The mistake of wiring that explains the trace, with the lines that mend it.
 fn wiring(findings: &Findings<'_>) -> Option<Reason> {
     if let Some(found) = &findings.wiring {
-        let reason = Reason::new(ReasonId::Wiring, found.suggestion.clone(), found.remedy());
+        let reason = Reason::new(ReasonId::Wiring, found.suggestion.clone(), remedy(found.mending()));
         return Some(reason.against(&found.sensors));
     }
     // What leaves as much as that is no explanation.
@@ -118,7 +118,8 @@ fn wiring(findings: &Findings<'_>) -> Option<Reason> {
     let percent = 100.0 * decision.wiring;
     let text = format!("the trace is explained if {} ({percent:.0} %)", best.cause);
     let table = best.mistake.map_or("columns", Mistake::table);
-    Some(Reason::new(ReasonId::Wiring, text, remedy(table, &best.columns)).against(&best.sensors))
+    let mending = (!best.columns.is_empty()).then_some((table, &best.columns[..]));
+    Some(Reason::new(ReasonId::Wiring, text, remedy(mending)).against(&best.sensors))
 }
 
 /// What the trace says too little of.

@@ -45,7 +45,6 @@ impl Wiring {
         let mistaken = || decision.explanations.iter().filter(|one| one.mistake.is_some());
         let first = mistaken().next().filter(|_| decision.wiring >= 1.0 - alpha)?;
         let mistake = first.mistake?;
-        let residuals = decision.residuals[0].zip(decision.residuals[1]);
         let is_motion = matches!(mistake, crate::explain::Mistake::LostSign(_));
         let [before, after] = decision.residuals;
         let leaves_much =
@@ -60,7 +59,7 @@ impl Wiring {
                 names.push(name);
             }
         }
-        let residuals = residuals.filter(|_| !is_motion);
+        let residuals = before.zip(after).filter(|_| !is_motion);
         let lines = mistake.mending(columns, rig);
         let (columns, cylinder) = if mistake.is_of_rig() { (vec![], lines) } else { (lines, vec![]) };
         Some(Self {
@@ -76,7 +75,7 @@ impl Wiring {
 
     /// It in one sentence, without a full stop.
     pub fn sentence(&self) -> String {
-        format!("{}; {}", self.suggestion, self.remedy())
+        format!("{}; {}", self.suggestion, remedy(self.mending()))
     }
 
     /// The table of the rig file, and the lines in it, that mend it; none where the recording has to be mended.
@@ -84,22 +83,16 @@ impl Wiring {
         let tables = [("columns", &self.columns[..]), ("cylinder", &self.cylinder[..])];
         tables.into_iter().find(|(_, lines)| !lines.is_empty())
     }
-
-    /// What to do about it.
-    pub(crate) fn remedy(&self) -> String {
-        self.mending().map_or_else(|| remedy("columns", &[]), |(table, lines)| remedy(table, lines))
-    }
 }
 
 /// What to do about a mistake that these lines of a table of the rig file mend; none where the recording has to be mended.
-pub(crate) fn remedy(table: &str, lines: &[String]) -> String {
+pub(crate) fn remedy(mending: Option<(&str, &[String])>) -> String {
+    const COLUMNS: &str = "check how the columns are wired and recorded";
+    let Some((table, lines)) = mending else { return format!("{COLUMNS}, and record anew") };
     let check = match table {
         "cylinder" => "compare both areas in the rig file with the data sheet",
-        _ => "check how the columns are wired and recorded",
+        _ => COLUMNS,
     };
-    if lines.is_empty() {
-        return format!("{check}, and record anew");
-    }
     format!("{check}; where that is so, mend it in the rig file: [{table}] {}", lines.join("; "))
 }
 

@@ -2,7 +2,7 @@
 //! the truth.
 
 use super::EffectConstants;
-use crate::{ATMOSPHERE_PA, Cylinder, Model, PerLeak, Real, Signals, Terms};
+use crate::{ATMOSPHERE_PA, Cylinder, Model, Real, Signals, Terms};
 
 /// Absolute pressure below which no gas law is evaluated, Pa.
 const LEAST_ABSOLUTE_PA: f64 = 1_000.0;
@@ -80,17 +80,17 @@ pub(super) fn beyond_cracking<T: Real>(pressure_pa: T, constants: &EffectConstan
     pressure_pa - within
 }
 
-/// A smooth direction of motion as both meters show it, which are quieter than a position's rate, without what leaks past the meters:
-/// Q_A − Q_B = (A_A + A_B) ẋ + 2 C_ip P_L + C_epA P_A − C_epB P_B.
+/// A smooth direction of motion as both meters show it, which are quieter than a position's rate: what a piston at rest would leave of
+/// both chambers' equations, which has no leak in it.
 pub(super) fn flow_direction<T: Real>(
     at: &Signals<T>,
     model: &Model<T>,
     constants: &EffectConstants<T>,
 ) -> T {
-    let PerLeak { internal, external_a, external_b } = model.leaks_m3spa;
-    let leaked_m3s =
-        T::lit(2.0) * internal * (at.pa_pa - at.pb_pa) + external_a * at.pa_pa - external_b * at.pb_pa;
-    let swept_m3s = known(at.qa_m3s) - known(at.qb_m3s) - leaked_m3s;
+    let (qa_m3s, qb_m3s) = (known(at.qa_m3s), known(at.qb_m3s));
+    let at_rest = Signals { qa_m3s, qb_m3s, pa_pa: at.pa_pa, pb_pa: at.pb_pa, ..Signals::default() };
+    let left = model.residual(&at_rest);
+    let swept_m3s = left.chamber_a_m3s - left.chamber_b_m3s;
     let turning_m3s = constants.slip_speed_mps * (model.cylinder.area_a_m2 + model.cylinder.area_b_m2);
     (swept_m3s / turning_m3s).libm_tanh()
 }

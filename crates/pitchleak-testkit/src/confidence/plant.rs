@@ -50,7 +50,7 @@ pub struct Physics {
     /// Leak past the piston above a pressure difference.
     pub relief: f64,
     /// Leak past the piston while extending only, per Pa.
-    pub one_way: f64,
+    pub extending: f64,
     /// Leak past the piston from A to B only, per Pa: past a check valve.
     pub checked: f64,
     /// Leak past the piston that grows with the time, per Pa and s.
@@ -202,7 +202,7 @@ impl Plant {
             + own.spool_leak * at.spool.abs() * pl
             + own.steep_leak * pl.signum() * pl.abs().powf(1.5)
             + own.relief * ((pl.abs() - 2e6).max(0.0)) * pl.signum()
-            + own.one_way * if at.v > 0.0 { pl } else { 0.0 }
+            + own.extending * if at.v > 0.0 { pl } else { 0.0 }
             + own.checked * pl.max(0.0)
             + own.growing * t * pl;
         let (va, vb) = (self.area_a * at.x.max(1e-4), self.area_b * (self.stroke - at.x).max(1e-4));

@@ -191,7 +191,7 @@ fn single(count: usize) -> Vec<Case> {
                 "leak above a pressure"
             }
             3 => {
-                own.one_way = leak;
+                own.extending = leak;
                 case.truth = vec![("internal_leak_direction", leak / 2.0)];
                 "one-way leak"
             }
