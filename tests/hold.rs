@@ -94,6 +94,26 @@ fn a_hundredth_of_a_litre_is_found_in_ten_seconds_and_its_interval_holds() {
     assert!((low..=0.995).contains(&share), "{share} of {all} intervals hold the leak");
 }
 
+/// A swinging load shows that oil passes the piston; how much hangs on the zeros of two pressures that hardly differ.
+#[test]
+fn a_leak_past_the_piston_at_hardly_any_load_pressure_is_said_to_be_one() {
+    let cylinder = HeldCylinder {
+        leaks_lpm: [1.0, 0.0, 0.0],
+        pressures_pa: [50e5, 49.5e5],
+        swing_n: 200.0,
+        ..HeldCylinder::default()
+    };
+    for seed in 0..12 {
+        let verdict = judged(&trace(cylinder, 10.0, seed).text).verdict;
+        assert!(verdict.status == Status::NotSure, "{}", verdict.text);
+        assert!(
+            verdict.text.contains("past the piston, but P_A and P_B are too nearly alike"),
+            "{}",
+            verdict.text
+        );
+    }
+}
+
 #[test]
 fn a_fifth_of_a_litre_to_the_outside_is_found_in_a_second() {
     for leak in [1, 2] {

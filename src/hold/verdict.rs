@@ -22,11 +22,12 @@ impl HoldTest {
             return told(Status::NotSure, Vec::new(), vec![self.too_short()], "");
         };
         let leaks_somehow = fit.found.beliefs.any > 1.0 - rig.decision.alpha;
+        let which_way = |open: &[Leak]| fit.which_way(open);
         let wording = Wording {
             teller: "This hold",
             beside: &|_| None,
             basis: self.usable(),
-            undecided: leaks_somehow.then(which_way),
+            undecided: leaks_somehow.then_some(&which_way),
             open: &|open| fit.too_little(open),
         };
         fit.found.verdict(rig, self.contradictions(fit, rig), &wording)
@@ -109,10 +110,22 @@ impl Fit {
         (self.found.beliefs.negative > CHANCE_SIGMAS * CHANCE_SIGMAS).then(|| {
             Reason::new(
                 ReasonId::NegativeLeak,
-                "the pressures rise as if oil came in while the ports are shut",
-                "check that both ports were shut all the time, and that the oil was not being warmed",
+                "by the balance of the hold, oil came in while the ports were shut",
+                "check that both ports were shut all the time, that the oil was not being warmed, and that the piston stood",
             )
         })
+    }
+
+    fn which_way(&self, open: &[Leak]) -> Reason {
+        let (text, suggestion) = if self.found.is_flat(open) {
+            (
+                "oil leaks past the piston, but P_A and P_B are too nearly alike to tell how much",
+                "hold under load",
+            )
+        } else {
+            ("oil leaks, but the hold does not tell which way", "hold longer, or again under another load")
+        };
+        Reason::new(ReasonId::Undecided, text, suggestion)
     }
 
     fn too_little(&self, open: &[Leak]) -> Reason {
@@ -127,14 +140,6 @@ impl Fit {
             suggestion,
         )
     }
-}
-
-fn which_way() -> Reason {
-    Reason::new(
-        ReasonId::Undecided,
-        "oil leaks, but the hold does not tell which way",
-        "hold longer, or again under another load",
-    )
 }
 
 const ADVICE: &str = "no flow is recorded: shut both ports for ten seconds and record it in a column `shut` (a hold test), record the valve's spool and the supply pressure (docs/valve.md), or the flow into a chamber";

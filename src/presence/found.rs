@@ -61,11 +61,14 @@ pub(crate) struct Wording<'a> {
     pub beside: &'a dyn Fn(Leak) -> Option<String>,
     /// What the verdict rests on.
     pub basis: String,
-    /// Why nothing is sure although oil leaks by some way or other.
-    pub undecided: Option<Reason>,
+    /// Why nothing is sure although oil leaks by some way or other, where these stay open.
+    pub undecided: Option<Why<'a>>,
     /// Why these leaks stay open.
-    pub open: &'a dyn Fn(&[Leak]) -> Reason,
+    pub open: Why<'a>,
 }
+
+/// Why leaks stay open.
+type Why<'a> = &'a dyn Fn(&[Leak]) -> Reason;
 
 /// A compressibility off by so many of the rig file's standard deviations contradicts it.
 const BULK_MODULUS_SIGMAS: f64 = 3.0;
@@ -135,7 +138,7 @@ impl Found {
         sentences.push(wording.basis.clone());
         let (status, reasons) = match &wording.undecided {
             _ if !found.is_empty() => (Status::Leak, Vec::new()),
-            Some(undecided) => (Status::NotSure, vec![undecided.clone()]),
+            Some(undecided) => (Status::NotSure, vec![undecided(&open)]),
             None if open.is_empty() => (Status::Sound, Vec::new()),
             None => (Status::NotSure, vec![self.empty().unwrap_or_else(|| (wording.open)(&open))]),
         };

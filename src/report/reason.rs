@@ -7,7 +7,7 @@ use crate::explain::{Decision, Explained, Mistake, WIRING_DOUBT};
 use crate::signal::Signal;
 use crate::units::readable;
 use crate::wiring::remedy;
-use pitchleak_core::Leak;
+use pitchleak_core::{Estimate, Leak};
 use serde::{Serialize, Serializer};
 
 /// What kind of reason.
@@ -145,8 +145,13 @@ pub(super) fn gaps(findings: &Findings<'_>) -> Vec<Reason> {
         let text = format!("{} leaks come and go, and the last seconds show none", join(&away, "and"));
         Reason::new(ReasonId::Undecided, text, "record some minutes, or watch it (`pitchleak watch`)")
     });
-    let (untold, undecided): (Vec<_>, Vec<_>) =
-        open.into_iter().partition(|leak| decision.probability[*leak] <= TELLS_NOTHING);
+    let is_untold = |leak: &Leak| {
+        let (flow, threshold_lpm) = (&findings.leakage[*leak], findings.threshold_lpm[*leak]);
+        let shows_it =
+            flow.std_lpm.is_some_and(|std| Estimate { value: 0.0, std }.half_width95() < threshold_lpm);
+        decision.probability[*leak] <= TELLS_NOTHING && !shows_it
+    };
+    let (untold, undecided): (Vec<_>, Vec<_>) = open.into_iter().partition(is_untold);
     let untold = (!untold.is_empty()).then(|| {
         let text = format!("this trace cannot tell about {} leaks", join(&untold, "and"));
         Reason::new(ReasonId::NotIdentifiable, text, RECORD)
@@ -190,7 +195,8 @@ fn sampled_too_seldom(findings: &Findings<'_>) -> Option<Reason> {
 }
 
 const RECORD: &str = "record longer, with the piston moving and both pressures changing";
-/// A leak as probable as before any data is one that the data say nothing of. The table's share of a leak.
+/// A leak as probable as before any data is one that the data say nothing of, where its interval is as wide as its threshold. The table's share of a
+/// leak.
 const TELLS_NOTHING: f64 = 0.05;
 
 /// A leak that may be above its threshold, and what else explains the trace.
@@ -198,8 +204,8 @@ fn undecided(findings: &Findings<'_>, decision: &Decision, leak: Leak) -> Reason
     let threshold = findings.threshold_lpm[leak];
     let percent = 100.0 * decision.probability[leak];
     let text = format!("{} leak above {threshold:.2} L/min with {percent:.0} %", leak.label());
-    let without = |one: &&Explained| one.leakage[leak] < threshold && !one.cause.is_empty();
-    match decision.explanations.iter().find(without) {
+    let without = |one: &&Explained| one.leakage[leak] < threshold;
+    match decision.explanations.iter().find(without).filter(|one| !one.cause.is_empty()) {
         Some(other) => Reason::new(
             ReasonId::OffsetOrLeak,
             format!("{text}, or {} ({:.0} %)", other.cause, 100.0 * other.probability),

@@ -174,13 +174,18 @@ fn sound() -> Found {
 
 const INTERNAL: PerLeak<bool> = PerLeak { internal: true, external_a: false, external_b: false };
 
-/// The data say as much of external B as before they came: nothing.
+/// The data say as much of external B as before they came: nothing. Where its interval is narrow they do.
 #[test]
 fn no_alarm_is_not_sound_where_the_trace_cannot_tell() {
     let mut found = sound();
     let decision = found.decision.as_mut().unwrap();
     (decision.status, decision.ruled_out) = (Status::NotSure, vec![Leak::Internal, Leak::ExternalA]);
     decision.probability.external_b = 0.02;
+    found.leakage.external_b.std_lpm = Some(0.01);
+    assert_eq!(found.judged(), (Status::NotSure, vec!["undecided"]));
+    let narrow = found.verdict().text;
+    assert!(narrow.starts_with("External B leak above 0.10 L/min with 2 %: "), "{narrow}");
+    found.leakage.external_b.std_lpm = Some(0.1);
     assert_eq!(found.judged(), (Status::NotSure, vec!["not_identifiable"]));
     let text = found.verdict().text;
     assert!(text.starts_with("This trace cannot tell about external B leaks."), "{text}");

@@ -272,6 +272,13 @@ fn leaks_then() -> impl TypedValueParser<Value = LeaksThen> {
         .try_map(|name| LeaksThen::by_name(&name).ok_or("neither zero nor unknown"))
 }
 
+/// A file as a rig file names it: from its own folder.
+fn seen_from(rig: Option<&Path>, file: &Path) -> PathBuf {
+    let folder = rig.and_then(Path::parent).unwrap_or(Path::new(""));
+    let within = file.strip_prefix(folder).map(Path::to_path_buf);
+    within.or_else(|_| std::path::absolute(file)).unwrap_or_else(|_| file.to_path_buf())
+}
+
 impl CalibrateArguments {
     pub fn run(&self) -> Result<Outcome, Failure> {
         let rig = rig(self.rig.as_ref(), &self.traces)?.uncalibrated();
@@ -294,7 +301,8 @@ impl CalibrateArguments {
         let found = calibrator.finish()?;
         file.finish_with(found.to_toml()?)?;
         output::print(&found.to_text(&output::palette()))?;
-        output::print(&format!("\nIn {}: [valve] calibration = \"{}\"\n", rig.name, self.out.display()))?;
+        let out = seen_from(rig.file(), &self.out);
+        output::print(&format!("\nIn {}: [valve] calibration = \"{}\"\n", rig.name, out.display()))?;
         Ok(Outcome::Done)
     }
 }

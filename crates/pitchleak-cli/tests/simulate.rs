@@ -260,7 +260,10 @@ fn calibrated(folder: &Path) -> String {
     assert!(simulate(&trace, &[OPEN_VALVE, &then].concat()).status.success());
     let made = pitchleak(&["calibrate", &path, "--rig", &name, "--leaks", "zero", "--out", &out]);
     assert!(made.status.success(), "{made:?}");
-    std::fs::write(&rig, untanked(&format!("calibration = {out:?}\n"))).unwrap();
+    // The line to paste is true where the rig file lies.
+    let advised = "calibration = \"valve.toml\"";
+    assert!(String::from_utf8_lossy(&made.stdout).contains(&format!("[valve] {advised}\n")), "{made:?}");
+    std::fs::write(&rig, untanked(&format!("{advised}\n"))).unwrap();
     name
 }
 

@@ -69,6 +69,13 @@ fn a_leaking_cylinder_is_one_line_that_says_since_when_and_what_its_latest_trace
     assert!(line.starts_with("LEAK      T7/B1  internal 1."), "{text}");
     assert!(line.ends_with(" L/min, since 2026-05-02, its latest trace is doubtful"), "{text}");
     assert_eq!(text.lines().count(), 3, "{text}");
+    let reasons = vec!["undecided".to_owned()];
+    let unsure = [FleetRow { status: Some(Status::NotSure), reasons, begins: day(1), ..rows[0].clone() }];
+    let text = FleetReport::of(&unsure).to_text(&Palette::PLAIN);
+    assert!(
+        text.contains("NOT SURE  T7/B1  internal 1.") && text.contains(" L/min in doubt, undecided"),
+        "{text}"
+    );
     let mut both = FleetRow { begins: day(4), ..rows[0].clone() };
     both.faults.push(Leak::ExternalB);
     let text = FleetReport::of(&[&days[..], &[both]].concat()).to_text(&Palette::PLAIN);

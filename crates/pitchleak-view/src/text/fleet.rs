@@ -142,8 +142,11 @@ pub(crate) fn found(cylinder: &FleetCylinder, report: &FleetReport<'_>) -> Strin
         Some(format!("{} {} L/min{since}", leak.label(), flow.flow_text()))
     };
     let is_leak = cylinder.status == Some(Status::Leak);
-    let mut found: Vec<String> =
-        if is_leak { leaks().filter_map(flow).collect() } else { cylinder.reasons.clone() };
+    let mut found: Vec<String> = leaks().filter_map(flow).collect();
+    if !is_leak {
+        found.iter_mut().for_each(|flow| flow.push_str(" in doubt"));
+        found.extend(cylinder.reasons.iter().cloned());
+    }
     found.extend(cylinder.since_text().filter(|_| at_once || !is_leak));
     let latest = cylinder.latest.and_then(|place| report.rows.get(place)).and_then(|row| row.status);
     if let Some(latest) = latest.filter(|latest| is_leak && *latest != Status::Leak) {
