@@ -48,7 +48,7 @@ pub struct LeakSummary {
     pub std_lpm: Option<f64>,
     /// Largest of them, L/min.
     pub max_lpm: f64,
-    /// Share of the estimates at which its alarm stood.
+    /// Share of the estimates that had it among their faults: its alarm stood, or it was apparent in a verdict in doubt.
     pub alarm_share: f64,
     /// Change over the days kept, the last with it, L/min per day; none of an hour, or where too few days tell.
     pub trend_lpm_per_day: Option<DayTrend>,

@@ -217,6 +217,13 @@ fn a_leak_that_is_likely_and_not_sure_says_what_else_it_may_be() {
     assert_eq!(close.judged(), (Status::NotSure, vec!["offset_or_leak"]));
     let text = close.verdict().text;
     assert!(text.contains("with 60 %, or flow meter A's zero is off (40 %)."), "{text}");
+    // Likelier than any zero is a leak just below its threshold.
+    let below = Explained {
+        leakage: PerLeak { internal: 0.09, ..PerLeak::default() },
+        ..explained("internal", "", 0.5)
+    };
+    close.decision.as_mut().unwrap().explanations.insert(1, below);
+    assert_eq!(close.judged(), (Status::NotSure, vec!["undecided"]));
 }
 
 #[test]
