@@ -330,6 +330,32 @@ fn no_edge_of_a_calibrated_valve_hides_a_leak_that_grows() {
     }
 }
 
+/// What docs/valve.md says of a stream: a leak that grows for minutes is in doubt and apparent, and nothing is alarmed.
+#[test]
+fn a_leak_that_grows_is_apparent_in_a_calibrated_valves_stream() {
+    let folder = TempDir::new().unwrap();
+    let (name, trace) = (calibrated(folder.path()), folder.path().join("trace.csv"));
+    for (option, leak) in [("--leak-external-a", "external_a"), ("--leak-external-b", "external_b")] {
+        for seed in ["1", "2", "3"] {
+            let settings = [&["--rig", &name, "--wind", "13", "--seed", seed], OPEN_VALVE].concat();
+            let grows = ["--duration", "600 s", option, "0 L/min -> 0.3 L/min @ 0 s..600 s"];
+            assert!(simulate(&trace, &[&settings[..], &grows].concat()).status.success());
+            let mut watch = Command::new(env!("CARGO_BIN_EXE_pitchleak"));
+            let rows = std::fs::File::open(&trace).unwrap();
+            let told = watch.args(["watch", "--rig", &name]).stdin(rows).output().unwrap();
+            let events = String::from_utf8(told.stdout).unwrap();
+            let last = events.lines().rev().find(|line| line.contains("\"type\":\"estimate\"")).unwrap();
+            let last: serde_json::Value = serde_json::from_str(last).unwrap();
+            assert_eq!(
+                (&last["status"], &last["faults"]),
+                (&"doubtful".into(), &[leak].into()),
+                "{seed}: {last}"
+            );
+            assert!(!events.contains("\"type\":\"alarm\""), "{leak} {seed}");
+        }
+    }
+}
+
 /// A chamber that a leak has emptied takes up what flows in at no pressure: what is read then is left out, and said.
 #[test]
 fn while_a_chamber_is_void_a_valve_tells_nothing() {

@@ -133,21 +133,20 @@ fn write_lines<T>(text: &mut String, legend: &str, all: &[T], line: impl Fn(&T) 
 
 /// What the verdict on a cylinder rests on, since when, and whether its latest trace says otherwise.
 pub(crate) fn found(cylinder: &FleetCylinder, report: &FleetReport<'_>) -> String {
+    let is_leak = cylinder.status == Some(Status::Leak);
     let leaks = || cylinder.faults.iter().map(|leak| (leak, &cylinder.leaks[*leak]));
-    let at_once = leaks().all(|(_, of)| of.since == cylinder.since);
+    // What a verdict in doubt says lasts as long as the doubt.
+    let at_once = !is_leak || leaks().all(|(_, of)| of.since == cylinder.since);
+    let doubt = if is_leak { "" } else { " in doubt" };
     let flow = |(leak, of): (&Leak, &CylinderLeak)| {
         let flow = of.flow?;
         let since =
             of.since_text().filter(|_| !at_once).map_or_else(String::new, |since| format!(" {since}"));
-        Some(format!("{} {} L/min{since}", leak.label(), flow.flow_text()))
+        Some(format!("{} {} L/min{doubt}{since}", leak.label(), flow.flow_text()))
     };
-    let is_leak = cylinder.status == Some(Status::Leak);
     let mut found: Vec<String> = leaks().filter_map(flow).collect();
-    if !is_leak {
-        found.iter_mut().for_each(|flow| flow.push_str(" in doubt"));
-        found.extend(cylinder.reasons.iter().cloned());
-    }
-    found.extend(cylinder.since_text().filter(|_| at_once || !is_leak));
+    found.extend(cylinder.reasons.iter().filter(|_| !is_leak).cloned());
+    found.extend(cylinder.since_text().filter(|_| at_once));
     let latest = cylinder.latest.and_then(|place| report.rows.get(place)).and_then(|row| row.status);
     if let Some(latest) = latest.filter(|latest| is_leak && *latest != Status::Leak) {
         found.push(format!("its latest trace is {}", latest.id()));
