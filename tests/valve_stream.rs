@@ -76,6 +76,41 @@ fn a_leak_that_sets_in_raises_its_alarm_and_no_other() {
     }
 }
 
+/// A leak that grows from none for as long as it is watched, beside a spool whose zero drifts and not.
+#[test]
+fn a_leak_that_grows_raises_its_alarm_and_no_other() {
+    let cases: Vec<_> = [(0, Leak::Internal, 2.0), (1, Leak::ExternalA, 0.6), (2, Leak::ExternalB, 0.6)]
+        .into_iter()
+        .flat_map(|leak| [0.0, 0.005].map(|null_drift| (leak, null_drift)))
+        .flat_map(|(leak, null_drift)| (0..2).map(move |seed| (leak, null_drift, seed)))
+        .collect();
+    cases.par_iter().for_each(|((index, leak, lpm), null_drift, seed)| {
+        let mut cylinder = ValveCylinder::drawn(26_000 + seed).leaking(*index, *lpm);
+        let (rig, _folder) = calibrated(&cylinder);
+        cylinder.valve.null_drift = *null_drift;
+        let grows = ValveCylinder { leaks_from_s: 0.0, leaks_until_s: SECONDS, ..later(&cylinder) };
+        let events = events(&rig, &grows.trace(SECONDS, 100.0, 3e-3));
+        let (mut doubtful, mut all) = (0, 0);
+        for event in &events {
+            match event {
+                Event::Alarm(alarm) => assert_eq!((alarm.fault, alarm.state), (*leak, AlarmState::Raised)),
+                Event::Estimate(estimate) => {
+                    assert!(estimate.faults.iter().all(|fault| fault == leak), "{estimate:?}");
+                    all += 1;
+                    doubtful += usize::from(estimate.status == Status::Doubtful);
+                }
+                _ => {}
+            }
+        }
+        let alarms = events.iter().filter(|event| matches!(event, Event::Alarm(_))).count();
+        println!("{leak:?} {seed}, null drift {null_drift}: {doubtful} of {all} DOUBTFUL");
+        assert!(
+            alarms == 1 && doubtful * 4 <= all,
+            "{leak:?} {seed} {null_drift}: {alarms}, {doubtful} of {all}"
+        );
+    });
+}
+
 #[test]
 fn a_sound_cylinder_is_sound_window_for_window() {
     let (mut sound, mut all) = (0, 0);
