@@ -127,6 +127,11 @@ impl Course {
         last.filter(|ramp| ramp.until_s < end_s)
     }
 
+    /// The ramp in which leaks still grow.
+    pub fn growing(&self, end_s: f64) -> Option<&Ramp> {
+        self.ramps.iter().find(|ramp| ramp.until_s >= end_s)
+    }
+
     /// The ramps of leaks that set in at once, which are yet to rise.
     pub fn jumps(&self) -> Vec<Ramp> {
         let jumps = self.ramps.iter().filter(|ramp| ramp.is_at_once);

@@ -18,14 +18,14 @@ use serde::Serialize;
 const INTERNAL_FLOOR: f64 = 0.00125;
 const FLOOR_PA: f64 = 50e5;
 
-/// In a stream nothing is said before so many seconds with the same leaks: of less, nothing tells whether noise explains them (chosen by
+/// In a stream nothing is said before so many seconds of leaks that stay, or grow, as they do: of less, nothing tells whether noise explains them (chosen by
 /// hysteresis and drift that set in).
 const LEAST_S: f64 = 29.0;
 
 /// What the valve's flows and the trace are worth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ValveSummary {
-    /// Time since the leaks changed, s.
+    /// Since when the leaks stay, or grow, as they do, s.
     pub usable_s: f64,
     /// Least and greatest position of the spool, shares of its stroke.
     pub spool_range: [f64; 2],

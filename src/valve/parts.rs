@@ -146,9 +146,9 @@ pub(super) struct Summary {
     /// The leaks' variances by how the parts differ, over those by the noise, and of how many parts.
     pub course: [f64; 3],
     pub parts: usize,
-    /// Since leaks changed, s.
+    /// Since when leaks stay or grow as they do, s.
     pub time_s: f64,
-    /// … or where they still do of late.
+    /// Since then, where they grow of late.
     pub pressures: Pressures,
     /// When that was, s.
     pub changed_at_s: Option<f64>,
@@ -334,7 +334,11 @@ fn summed_up(own: &[Part], course: &Course, before: &Belief, at: &Unknowns) -> O
         let later = own.iter().filter(|part| part.middle_s() > from_s);
         later.fold(Pressures::default(), |sum, part| sum.plus(&part.pressures))
     };
-    let from_s = last.map_or(f64::NEG_INFINITY, |ramp| ramp.until_s);
+    let (from_s, of_late_s) = match (best.course.growing(end_s), last) {
+        (Some(ramp), _) => (ramp.from_s, end_s - OF_LATE_S),
+        (None, Some(ramp)) => (ramp.until_s, ramp.until_s),
+        (None, None) => (f64::NEG_INFINITY, f64::NEG_INFINITY),
+    };
     Some(Summary {
         belief: Belief {
             mean: at + best.step,
@@ -345,7 +349,7 @@ fn summed_up(own: &[Part], course: &Course, before: &Belief, at: &Unknowns) -> O
         course: unlike(&around, &covariance),
         parts: own.len(),
         time_s: since(from_s).time_s,
-        pressures: since(if growth.is_some() { end_s - OF_LATE_S } else { from_s }),
+        pressures: since(of_late_s),
         changed_at_s: last.map(Ramp::changed_at_s),
         changes: best.course.ramps.len(),
         growth,
