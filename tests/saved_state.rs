@@ -64,7 +64,7 @@ fn another_version_is_named_and_what_is_none_is_not() {
     let version = b"\x72pitchleak.state/".len();
     state[version] = b'0';
     assert!(
-        matches!(Stream::restore(&state), Err(RestoreError::Version(name)) if name == "pitchleak.state/07")
+        matches!(Stream::restore(&state), Err(RestoreError::Version(name)) if name == "pitchleak.state/06")
     );
     state[version] = b'\x1b';
     assert!(matches!(Stream::restore(&state), Err(RestoreError::Content(_))));

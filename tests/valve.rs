@@ -323,7 +323,7 @@ fn a_leak_that_sets_in_is_told_as_it_is_now() {
     });
     let right = found.iter().filter(|one| {
         let at_s = one.changed_at_s.unwrap_or_default();
-        is_found(one, Leak::Internal) && (25.0..=40.5).contains(&at_s)
+        is_found(one, Leak::Internal) && (25.0..=40.0).contains(&at_s)
     });
     let (right, covered) = (right.count() as u64, covered(&found, Leak::Internal, 0.2));
     println!("sets in: {right} of {}, covered {covered:.2}", runs());
@@ -369,44 +369,6 @@ fn a_leak_that_grows_is_told_as_it_is_at_the_end() {
     let z = (squares / f64::from(right)).sqrt();
     println!("grows: {right} right, {doubtful} doubtful of {all}; rms error {z:.2} spreads");
     assert!(right * 100 >= all * 80 && z < 1.5, "{right} of {all}, {z}");
-}
-
-/// Leaks that change amid a trace, at once or in a while, that goes on or is over, beside the same.
-#[test]
-fn a_leak_that_changes_amid_a_trace_is_told_as_it_is_at_the_end() {
-    let known: Vec<_> =
-        (0..runs().div_ceil(4)).into_par_iter().map(|seed| known(seed, LeaksThen::Zero, |_| {})).collect();
-    let kinds = [(20.0, 60.0), (35.0, 60.0), (0.0, 35.0), (15.0, 40.0), (30.0, 30.0)];
-    let flaws = [(0.0, 0.0), (0.005, 0.0), (0.0, 0.003), (0.005, 0.003)];
-    let [mut right, mut wrong, mut all] = [0; 3];
-    for (from_s, until_s) in kinds {
-        let cases: Vec<_> = (0..known.len())
-            .flat_map(|seed| WINDS.map(|wind| (seed, wind)))
-            .flat_map(|(seed, wind)| flaws.map(|flaws| (seed, wind, flaws)))
-            .flat_map(|case| [(0, 0.1), (1, 0.2), (2, 0.2)].map(|leak| (case, leak)))
-            .collect();
-        let told = cases.par_iter().map(|((seed, wind, (null_drift, hysteresis)), (index, lpm))| {
-            let change = |now: &mut ValveCylinder| {
-                (now.leaks_from_s, now.leaks_until_s) = (from_s, until_s);
-                (now.leaks_lpm[*index], now.wind) = (*lpm, *wind);
-                (now.valve.null_drift, now.valve.hysteresis) = (*null_drift, *hysteresis);
-            };
-            let report = later(&known[*seed], *seed as u64, change, |text| text);
-            if report.verdict.status != Status::Leak {
-                return [0, 0, 1];
-            }
-            let entry = report.estimates.leaks()[Leak::ALL[*index]].clone();
-            let z = (entry.value - lpm * UNIT) / entry.std.expect("a spread");
-            let is_right = report.verdict.faults == [Leak::ALL[*index]] && z.abs() < 4.0;
-            [usize::from(is_right), usize::from(!is_right), 1]
-        });
-        let sum = |a: [usize; 3], b: [usize; 3]| std::array::from_fn(|i| a[i] + b[i]);
-        let [is_right, is_wrong, of] = told.reduce(|| [0; 3], sum);
-        println!("changes from {from_s} to {until_s} s: {is_right} right, {is_wrong} wrong of {of}");
-        (right, wrong, all) = (right + is_right, wrong + is_wrong, all + of);
-    }
-    println!("changes: {right} right, {wrong} wrong of {all}");
-    assert!(right * 100 >= all * 85 && wrong * 100 <= all, "{right} right, {wrong} wrong of {all}");
 }
 
 /// A command instead of the spool's position, with the hysteresis that the data sheet declares.

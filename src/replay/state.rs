@@ -28,9 +28,9 @@ pub enum RestoreError {
 }
 
 /// Name and version of the saved form, …
-const SCHEMA: &str = "pitchleak.state/17";
+const SCHEMA: &str = "pitchleak.state/16";
 /// … which begins every state as a text of CBOR.
-const HEAD: &[u8] = b"\x72pitchleak.state/17";
+const HEAD: &[u8] = b"\x72pitchleak.state/16";
 /// The heads of saved states of any version: of one digit, and of two.
 const ANY_HEADS: [(&[u8], usize); 2] = [(b"\x71pitchleak.state/", 1), (b"\x72pitchleak.state/", 2)];
 /// Bytes of the checksum at the end: CRC-32 of all before it, little-endian. It finds every single wrong bit and every

@@ -151,8 +151,7 @@ impl Calibrator {
     /// [`CalibrationError::NoValve`].
     pub fn new(rig: &Rig, leaks: LeaksThen) -> Result<Self, CalibrationError> {
         let sheet = rig.valve.as_ref().ok_or_else(|| CalibrationError::NoValve(rig.name.clone()))?;
-        let mut meter = ValveMeter::with(rig, sheet, before(rig, sheet, leaks), None);
-        meter.kept_s = f64::INFINITY;
+        let meter = ValveMeter::with(rig, sheet, before(rig, sheet, leaks), None);
         Ok(Self { leaks, meter, traces: Vec::new(), evidence: None })
     }
 
@@ -194,9 +193,9 @@ impl Calibrator {
     /// [`CalibrationError::Nothing`], [`CalibrationError::LeakChanged`].
     pub fn finish(mut self) -> Result<Calibration, CalibrationError> {
         // What goes to and fro about values that noise explains is known by as much as its spread says.
-        let is_known = |taken: &Taken| taken.is_settled || taken.summary.is_explained();
+        let is_known = |taken: &Taken| taken.is_settled || taken.is_explained();
         let taken = self.meter.taken().filter(is_known).ok_or(CalibrationError::Nothing)?;
-        if let Some(at_s) = taken.summary.changed_at_s {
+        if let Some(at_s) = taken.changed_at_s {
             return Err(CalibrationError::LeakChanged(at_s));
         }
         let covariance = taken.summary.belief.covariance().ok_or(CalibrationError::Nothing)?;
@@ -207,7 +206,7 @@ impl Calibrator {
             leaks: self.leaks,
             evidence: self.evidence,
             rig: rig_hash(&self.meter.rig, &self.meter.sheet),
-            seconds: taken.summary.time_s,
+            seconds: taken.summary.pressures.time_s,
             spool_range: self.meter.spool_range().ok_or(CalibrationError::Nothing)?,
             scatter: taken.summary.noise.sqrt(),
             mean: taken.summary.belief.mean.iter().copied().collect(),

@@ -32,8 +32,6 @@ pub(super) struct Known {
     pub variances: Signals,
     /// So many numbers a step tells beside the signals.
     pub told: f64,
-    /// Steps are summed up in parts of so many seconds: all in one unless a meter says.
-    pub part_s: f64,
 }
 
 /// A sensor without noise has this of its full scale: rounding.
@@ -61,7 +59,6 @@ impl Known {
                 supply,
             ]),
             told: 2.0,
-            part_s: f64::INFINITY,
         }
     }
 }

@@ -5,7 +5,7 @@
 //! What is known before holds all but the leaks back at first: else the noise of the pressures is taken for compression, and a leak for
 //! edges as no valve has them.
 
-use super::course::{Course, Ramp};
+use super::course::Course;
 use super::edges::{SPOOL, Signals};
 use super::equations::{Known, Node, Rates, Step};
 use super::parts::Part;
@@ -36,6 +36,8 @@ const SHARPEST: f64 = 1e-3;
 const REACH: usize = 3;
 /// Fewer readings without a pause tell nothing.
 pub(super) const LEAST_READINGS: usize = 8;
+/// A window is summed up in parts of so many seconds: leaks may change between two of them.
+const PART_S: f64 = 5.0;
 
 /// Readings without a pause.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
@@ -63,20 +65,11 @@ pub(super) struct Fit {
 }
 
 impl Run {
-    /// The readings without those amid some ramps, as runs of their own.
-    pub fn without(&self, ramps: &[Ramp]) -> Vec<Self> {
-        let mut runs = vec![self.readings.clone()];
-        for ramp in ramps {
-            let sides = |readings: Vec<Node>| {
-                let (before, after): (Vec<Node>, Vec<Node>) = readings
-                    .into_iter()
-                    .filter(|node| !ramp.has(node.t_s))
-                    .partition(|node| node.t_s < ramp.from_s);
-                [before, after]
-            };
-            runs = runs.into_iter().flat_map(sides).filter(|run| run.len() >= LEAST_READINGS).collect();
-        }
-        runs.into_iter().map(|readings| Self { readings }).collect()
+    /// The readings from one time up to another, s, as a run of its own.
+    pub fn between(&self, from_s: f64, to_s: f64) -> Option<Self> {
+        let readings: Vec<Node> =
+            self.readings.iter().filter(|node| node.t_s >= from_s && node.t_s < to_s).copied().collect();
+        (readings.len() >= LEAST_READINGS).then_some(Self { readings })
     }
 
     /// Time that it spans, s.
@@ -125,8 +118,7 @@ impl Smoothed {
                 // At the readings themselves, made linear at the signals.
                 step.residual_m3 += step.by_first * (first_reading.signals - first.signals)
                     + step.by_last * (reading.signals - node.signals);
-                let begin_s = self.nodes.first().map_or(0.0, |node| node.t_s);
-                white.push(&step, 0.5 * (first.t_s + node.t_s) - begin_s)?;
+                white.push(&step)?;
             }
             last = Some((reading, node, rates));
         }
@@ -147,30 +139,16 @@ impl Smoothed {
 
     fn parts(&self, white: &Whitening) -> Vec<Part> {
         let mut parts: Vec<Part> = Vec::new();
-        let begin_s = self.nodes.first().map_or(0.0, |node| node.t_s);
         for (step, pair) in white.steps().iter().zip(self.nodes.windows(2)) {
             let [from, to] = pair else { continue };
-            if parts.last().is_none_or(|part| from.t_s >= part.from_s + self.known.part_s) {
+            if parts.last().is_none_or(|part| from.t_s >= part.from_s + PART_S) {
                 parts.push(Part::from(from.t_s));
             }
             if let Some(part) = parts.last_mut() {
                 part.add(step, [from, to], self.known.told);
             }
         }
-        parts.into_iter().map(|part| part.whole(begin_s)).collect()
-    }
-}
-
-impl Fit {
-    /// What is left of all equations, squared.
-    pub fn squares(&self) -> f64 {
-        self.parts.iter().map(|part| part.squares).sum()
-    }
-
-    /// Its parts, linear around the unknowns at the end alone.
-    pub fn flat_parts(&self) -> Vec<Part> {
-        let course = &self.place.course;
-        self.parts.iter().map(|part| part.around(&course.amid(part.middle_s()))).collect()
+        parts.into_iter().map(Part::whole).collect()
     }
 }
 

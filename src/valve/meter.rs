@@ -7,23 +7,27 @@ use super::edges::{PA, PB, SPOOL, Signals, Spool};
 use super::equations::{Known, Node};
 use super::fit::{Fit, LEAST_READINGS, Place, Run, fit};
 use super::means::Means;
-use super::parts::{CHANGED, LEAST_IN_COURSE, Part, Summary, likeliest};
-use super::unknowns::Belief;
+use super::parts::{CHANGED, Likeliest, Summary, likeliest};
+use super::unknowns::{Belief, Unknowns};
 use super::unread;
 use crate::rig::{Rig, ValveSheet};
 use crate::signal::Signal;
 use crate::trace::Record;
+use nalgebra::Matrix3;
 use pitchleak_core::Leak;
 use serde::{Deserialize, Serialize};
 
 /// A window has so many readings at the most: ten minutes at 100 Hz, 15 MB. Less, and the unknowns of the first are too far from linear.
 const MOST_READINGS: usize = 60_000;
-/// What was read longer ago than this, s, says nothing of now: a window of a file at 100 Hz (chosen).
-const KEPT_S: f64 = 600.0;
-/// Leaks of a trace may change every so many seconds.
-const PART_S: f64 = 5.0;
-/// The likeliest course is found anew around itself so often at the most; numerical.
-const MOST_COURSES: usize = 4;
+/// Leaks change so often in a window at the most: a search that halves it must end.
+const MOST_CHANGES: usize = 3;
+/// Changes are counted together within so long, s: a window of a file at 100 Hz (chosen).
+const CHANGES_COUNT_S: f64 = 600.0;
+/// Variance of a leak that is rounding, in its unit's square.
+const LEAST_SPREAD: f64 = 1e-12;
+
+/// Leaks that would have to change oftener than this within a window are none (chosen).
+const SO_MANY_CHANGES: usize = 1;
 /// A pressure so many standard deviations below the atmosphere's is so for certain.
 const VOID_SIGMAS: f64 = 3.0;
 /// Fewer readings tell nothing.
@@ -34,14 +38,10 @@ const LEAST_WINDOW: usize = 50;
 pub struct ValveMeter {
     pub(super) rig: Rig,
     pub(super) sheet: ValveSheet,
-    /// Before any reading.
-    pub(super) before: Belief,
-    /// What the windows that have ended said, linear around that.
-    parts: Vec<Part>,
-    /// … of the last seconds, so many.
-    pub(super) kept_s: f64,
-    /// Leaks may change every so many seconds.
-    pub(super) part_s: f64,
+    /// Before the window.
+    before: Belief,
+    /// Where the last search ended; none before the first.
+    at: Option<Unknowns>,
     runs: Vec<Run>,
     count: usize,
     /// … and spans so many seconds at the most.
@@ -59,12 +59,57 @@ pub struct ValveMeter {
     pub(super) last: Option<Taken>,
 }
 
-/// What the readings so far said.
+/// What a window said.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Taken {
     pub summary: Summary,
-    /// Whether the search came to an end.
+    /// Around which it is linear.
+    pub at: Unknowns,
+    pub changed_at_s: Option<f64>,
+    /// Leaks changed in it, somewhere: what it says of the valve is not believed.
+    is_mixed: bool,
+    /// Whether the search for it came to an end.
     pub is_settled: bool,
+    /// How often they changed.
+    pub changes: usize,
+    /// Whether noise explains what was before the last change, too.
+    pub was_explained: bool,
+}
+
+impl Taken {
+    /// Whether noise explains what is left, and the leaks change no oftener than leaks do.
+    pub fn is_explained(&self) -> bool {
+        self.was_explained && self.summary.is_explained() && self.changes <= SO_MANY_CHANGES
+    }
+
+    /// With what went before. Changes count for as long as a window of a file is.
+    fn after(self, last: &Self, begin_s: f64) -> Self {
+        let is_recent = last.changed_at_s.is_none_or(|changed_s| begin_s - changed_s < CHANGES_COUNT_S);
+        let before = if is_recent { last.changes } else { last.changes.min(1) };
+        if self.changed_at_s.is_some() {
+            let changes = if is_recent { before + self.changes } else { self.changes };
+            return Self { changes, ..self };
+        }
+        // A window amid which leaks changed, or whose search came to no end, says nothing of how well the model fits.
+        let is_like = last.is_settled && !last.is_mixed;
+        let summary = if is_like { self.summary.after(&last.summary) } else { self.summary };
+        Self {
+            summary,
+            changed_at_s: last.changed_at_s,
+            changes: before,
+            was_explained: last.was_explained || !is_recent,
+            ..self
+        }
+    }
+}
+
+/// By how much leaks have moved beyond what was known of them: squares in those of what they may by chance.
+fn moved(before: &Belief, after: &Belief) -> Option<f64> {
+    let (was, wide) = before.leaks()?;
+    let (is, narrow) = after.leaks()?;
+    let off = is - was;
+    let spread = (wide - narrow).symmetric_part() + Matrix3::identity() * LEAST_SPREAD;
+    Some(off.dot(&spread.cholesky()?.solve(&off)))
 }
 
 impl ValveMeter {
@@ -74,9 +119,7 @@ impl ValveMeter {
             rig: rig.clone(),
             sheet: sheet.clone(),
             before,
-            parts: Vec::new(),
-            kept_s: KEPT_S,
-            part_s: PART_S,
+            at: None,
             runs: Vec::new(),
             count: 0,
             window_s: f64::INFINITY,
@@ -201,95 +244,120 @@ impl ValveMeter {
 
     /// What the readings so far say; none where they are too few, or no finite number comes out.
     pub(super) fn taken(&mut self) -> Option<Taken> {
-        self.window().map(|(_, taken)| taken).or_else(|| self.last.clone())
+        self.window().or_else(|| self.last.clone())
     }
 
-    /// The parts of this window and of those before, and what they say together; where no valve as believed explains the window, what
-    /// that says alone.
-    fn window(&mut self) -> Option<(Vec<Part>, Taken)> {
+    /// What the readings of this window say, and those before.
+    fn window(&mut self) -> Option<Taken> {
         if self.count < LEAST_WINDOW {
             return None;
         }
+        let start = self.at.unwrap_or(self.before.mean);
         self.runs.retain(|run| run.readings.len() >= LEAST_READINGS);
-        let is_sure = |taken: &&Taken| taken.summary.parts >= LEAST_IN_COURSE && taken.summary.is_explained();
-        let last = self.last.as_ref().filter(is_sure);
-        let known = last.and_then(|taken| taken.summary.belief.with_new_leaks());
-        let (fit, alone) = self.fitted(&self.runs, known.as_ref().unwrap_or(&self.before))?;
-        if !fit.is_settled {
-            return Some((Vec::new(), Taken { summary: alone, is_settled: false }));
+        let mut taken = self.settled(&self.runs, &self.before, start, MOST_CHANGES)?;
+        self.at = Some(taken.at);
+        let Some(last) = &self.last else { return Some(taken) };
+        let begin_s = self.runs.first()?.readings.first()?.t_s;
+        let limit = CHANGED * taken.summary.noise.max(1.0);
+        if taken.changes == 0 && moved(&self.before, &taken.summary.belief).is_some_and(|far| far > limit) {
+            let before = self.before.with_new_leaks()?;
+            taken = self.settled(&self.runs, &before, taken.at, 0)?;
+            (taken.changed_at_s, taken.changes, taken.is_mixed) = (Some(begin_s), 1, true);
         }
-        let far = (fit.place.unknowns - self.before.mean).fixed_resize(0.0);
-        let now: Vec<Part> = fit.flat_parts().iter().map(|part| part.around(&far)).collect();
-        let end_s = now.last()?.until_s();
-        let recent = self.parts.iter().filter(|part| end_s - part.from_s <= self.kept_s);
-        let parts: Vec<Part> = recent.cloned().chain(now).collect();
-        let drifted = |part: &Part| {
-            part.before_drift(&self.before.drift(&self.rig, &self.sheet, end_s - part.until_s()))
-        };
-        let told = parts.iter().map(drifted).collect::<Option<Vec<Part>>>()?;
-        let (_, summary) = likeliest(&told, &[], &self.before, &self.before.mean)?;
-        Some((parts, Taken { summary, is_settled: true }))
+        Some(taken.after(last, begin_s))
     }
 
     /// What readings say in the likeliest course: as means, where they may stand for them.
-    fn fitted(&self, runs: &[Run], before: &Belief) -> Option<(Fit, Summary)> {
-        let known = Known { part_s: self.part_s, ..Known::of(&self.rig, &self.sheet) };
+    fn fitted(&self, runs: &[Run], before: &Belief, start: Unknowns) -> Option<(Fit, Summary)> {
+        let known = Known::of(&self.rig, &self.sheet);
         let found = Means::of(runs, &known.variances).and_then(|means| {
             let quieter = Known { variances: known.variances / means.count as f64, ..known.clone() };
-            self.in_course(&means.runs, before, &quieter)
+            self.in_course(&means.runs, before, start, &quieter)
                 .filter(|(_, summary)| means.are_white(summary.noise))
         });
-        found.or_else(|| self.in_course(runs, before, &known))
+        found.or_else(|| self.in_course(runs, before, start, &known))
     }
 
-    /// Where the readings are no noise beside constant leaks, all is made linear around the likeliest course, and around the one that is
-    /// likeliest from there.
-    fn in_course(&self, runs: &[Run], before: &Belief, known: &Known) -> Option<(Fit, Summary)> {
+    /// Where the readings are no noise beside constant leaks, a line is tried, and else all is made linear around leaks that are others in
+    /// each part: from there a change looks as it is.
+    fn in_course(
+        &self,
+        runs: &[Run],
+        before: &Belief,
+        start: Unknowns,
+        known: &Known,
+    ) -> Option<(Fit, Summary)> {
         let fit_in = |course: Course| {
-            let jumps = course.jumps();
-            let runs: Vec<Run> = runs.iter().flat_map(|run| run.without(&jumps)).collect();
-            let place = Place { unknowns: before.mean, course };
-            let fit = fit(&runs, before, place, self.sheet.hysteresis, known)?;
-            let (course, summary) = likeliest(&fit.flat_parts(), &jumps, before, &fit.place.unknowns)?;
-            Some((fit, course, summary))
+            let place = Place { unknowns: start, course };
+            let fit = fit(runs, before, place, self.sheet.hysteresis, known)?;
+            let found = likeliest(&fit.parts, before, &fit.place)?;
+            Some((fit, found))
         };
-        let refined = |mut course: Course| {
-            let mut found = None;
-            for _ in 0..MOST_COURSES {
-                let next = fit_in(course.clone()).filter(|(fit, ..)| fit.is_settled);
-                let Some((fit, next, summary)) = next else { break };
-                found = Some((fit, summary));
-                if next.is_like(&std::mem::replace(&mut course, next.clone())) {
-                    break;
-                }
-            }
-            found
-        };
-        let (constant, course, summary) = fit_in(Course::constant())?;
-        let line = Course::line(&constant.parts);
-        if constant.parts.len() < LEAST_IN_COURSE {
-            let line = fit_in(line).filter(|(fit, ..)| fit.is_settled);
-            let line = line.filter(|(fit, ..)| fit.squares() + CHANGED < constant.squares());
-            return Some(line.map_or((constant, summary), |(fit, _, summary)| (fit, summary)));
+        let (constant, Likeliest { at_once, line }) = fit_in(Course::constant())?;
+        if line.is_none() && at_once.since == 0 && at_once.is_explained() {
+            return Some((constant, at_once));
         }
-        if course.is_constant() {
-            return Some((constant, summary));
+        let line = Course::line(&constant.parts).and_then(fit_in);
+        let line = line.and_then(|(fit, found)| Some((fit, found.line?)));
+        if let Some(told) = line.filter(|(fit, summary)| fit.is_settled && summary.is_explained()) {
+            return Some(told);
         }
-        let is_explained = |(_, summary): &(Fit, Summary)| summary.is_explained();
-        let found = refined(course);
-        if found.as_ref().is_some_and(is_explained) {
-            return found;
-        }
-        refined(line).filter(is_explained).or(found).or(Some((constant, summary)))
+        // Both sides of a change are fitted anew, wherever this search ended.
+        let stairs = fit_in(Course::stairs(&constant.parts)).filter(|(_, found)| found.at_once.since > 0);
+        Some(match stairs {
+            Some((stairs, found)) => (stairs, found.at_once),
+            None => (constant, at_once),
+        })
     }
 
-    /// What the window says is kept, where the search for it came to an end.
+    /// What readings say of the leaks since they changed; what was before the change tells of the valve alone.
+    fn settled(&self, runs: &[Run], before: &Belief, start: Unknowns, changes: usize) -> Option<Taken> {
+        let (fit, summary) = self.fitted(runs, before, start)?;
+        let constant = Taken {
+            summary,
+            at: fit.place.unknowns,
+            changed_at_s: None,
+            is_mixed: false,
+            is_settled: fit.is_settled,
+            changes: 0,
+            was_explained: true,
+        };
+        let since = constant.summary.since;
+        if since == 0 || changes == 0 {
+            return Some(constant);
+        }
+        // Within the part before, or in this one, which are left out.
+        let begins = |part: usize| fit.parts.get(part).map(|part| part.from_s);
+        let changed_at_s = begins(since)?;
+        let until_s = begins(since - 1)?;
+        let from_s = begins(since + 1).filter(|_| since + 2 < fit.parts.len()).unwrap_or(changed_at_s);
+        let part = |from_s: f64, to_s: f64| {
+            runs.iter().filter_map(|run| run.between(from_s, to_s)).collect::<Vec<_>>()
+        };
+        let early = part(f64::NEG_INFINITY, until_s);
+        let valve = self.settled(&early, before, before.mean, changes - 1);
+        let known = valve.as_ref().map_or(before, |taken| &taken.summary.belief).with_new_leaks()?;
+        let now = self.settled(&part(from_s, f64::INFINITY), &known, known.mean, changes - 1)?;
+        let was_explained =
+            valve.as_ref().is_none_or(|taken| taken.was_explained && taken.summary.is_explained());
+        Some(Taken {
+            changed_at_s: now.changed_at_s.or(Some(changed_at_s)),
+            changes: now.changes + 1 + valve.map_or(0, |taken| taken.changes),
+            was_explained: now.was_explained && was_explained,
+            ..now
+        })
+    }
+
+    /// What the window says becomes what was believed before, where the search for it came to an end.
     fn next_window(&mut self) {
-        if let Some((parts, taken)) = self.window() {
-            if taken.is_settled {
-                self.parts = parts;
-            }
-            if taken.is_settled || !taken.summary.is_explained() || self.last.is_none() {
+        if let Some(taken) = self.window() {
+            let tells = taken.is_settled && !taken.is_mixed;
+            let known = if tells { None } else { self.before.with_new_leaks() };
+            let known = known.unwrap_or_else(|| taken.summary.belief.clone());
+            let later = known.later(&self.rig, &self.sheet, self.seconds());
+            self.before = later.unwrap_or(known);
+            self.at = self.at.filter(|_| tells);
+            if taken.is_settled || !taken.is_explained() || self.last.is_none() {
                 self.last = Some(taken);
             }
         }

@@ -3,8 +3,8 @@
 //! 1. [`ValveMeter`] keeps the readings of a window: position, both pressures, the spool and the supply's pressure.
 //! 2. `fit` finds leaks, compressibility and what is not known of the valve by maximum likelihood, with the continuity equations of
 //!    `equations`, the valve's flows of `edges`, and the noise made white by `whitening`.
-//! 3. `parts` sums up what some seconds say. `course` has how leaks go through them, constant but for ramps; `parts` says which ramps, and
-//!    whether what is left is noise.
+//! 3. `course` has how leaks go through the window: constant, others since a moment, or in a line. `parts` says which, and whether what is
+//!    left is noise.
 //! 4. [`presence`](crate::presence) weighs which leaks there are, and [`ValveTest`] has the verdict and its words.
 //!
 //! [`Calibrator`] keeps what traces of a rig say of its valve for later ones.

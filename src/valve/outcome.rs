@@ -2,7 +2,7 @@
 
 use super::calibration::{LeaksThen, Since};
 use super::meter::{Taken, ValveMeter};
-use super::parts::{LEAST_IN_COURSE, Summary};
+use super::parts::Summary;
 use super::unknowns::{Belief, KAPPA, LEAK_STD, LEAK_UNIT_M3SPA, clearance_std};
 use crate::presence::{self, Found, FoundLeak, LeakLikelihood, Place};
 use crate::report::{LeakTrend, ReplayReport, TraceSummary};
@@ -18,14 +18,14 @@ use serde::Serialize;
 const INTERNAL_FLOOR: f64 = 0.00125;
 const FLOOR_PA: f64 = 50e5;
 
-/// In a stream nothing is said before so many seconds of leaks that stay, or grow, as they do: of less, nothing tells whether noise explains them (chosen by
+/// In a stream nothing is said before so many parts with the same leaks: of fewer, none tells whether noise explains them (chosen by
 /// hysteresis and drift that set in).
-const LEAST_S: f64 = 29.0;
+const LEAST_PARTS: usize = 6;
 
 /// What the valve's flows and the trace are worth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ValveSummary {
-    /// Since when the leaks stay, or grow, as they do, s.
+    /// Time since the leaks changed, s.
     pub usable_s: f64,
     /// Least and greatest position of the spool, shares of its stroke.
     pub spool_range: [f64; 2],
@@ -67,10 +67,7 @@ impl ValveMeter {
 
     /// What the windows that have ended say of a rig; none where there was nothing of the valve.
     pub(super) fn so_far(&self, rig: &Rig) -> Option<ValveTest> {
-        let is_telling = |taken: &&Taken| {
-            let Summary { parts, time_s, .. } = taken.summary;
-            parts >= LEAST_IN_COURSE && (time_s >= LEAST_S || !taken.summary.is_explained())
-        };
+        let is_telling = |taken: &&Taken| taken.summary.parts >= LEAST_PARTS || !taken.is_explained();
         self.test(self.last.as_ref().filter(is_telling).cloned(), rig)
     }
 
@@ -87,7 +84,7 @@ impl ValveMeter {
         let clearance =
             |pressure_pa: f64| clearance_std(&self.sheet) * LEAK_UNIT_M3SPA * pressure_pa * LPM_PER_M3S;
         let summary = ValveSummary {
-            usable_s: fit.map_or(0.0, |fit| fit.time_s),
+            usable_s: fit.map_or(0.0, |fit| fit.pressures.time_s),
             spool_range,
             clearance_lpm: [clearance(pressures_pa.external_a), clearance(pressures_pa.external_b)],
             scatter: fit.map_or(1.0, |fit| fit.noise.sqrt()),
@@ -138,7 +135,7 @@ impl ValveTest {
 
     /// Whether a valve as declared, its leaks and noise explain the readings.
     pub(super) fn is_explained(&self) -> bool {
-        self.taken.as_ref().is_some_and(|taken| taken.summary.is_explained())
+        self.taken.as_ref().is_some_and(Taken::is_explained)
     }
 
     /// By how much a leak grows within the trace, L/min per s, where leaks go in straight lines.
@@ -173,7 +170,7 @@ impl ValveTest {
                 LeakTrend::new(flow, slope, threshold_lpm[leak])
             });
         }
-        let changed_at_s = self.taken.as_ref().and_then(|taken| taken.summary.changed_at_s);
+        let changed_at_s = self.taken.as_ref().and_then(|taken| taken.changed_at_s);
         ReplayReport { valve: Some(self.summary.clone()), changed_at_s, ..report }
     }
 }

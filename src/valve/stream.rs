@@ -12,9 +12,6 @@ use serde::{Deserialize, Serialize};
 /// Chosen: short, as all readings of a window are kept and saved; a calibrated valve is known, so windows need not be long.
 const WINDOW_S: f64 = 10.0;
 
-/// What the windows of so many seconds said is kept, and saved: growth that matters shows within them.
-const KEPT_S: f64 = 300.0;
-
 /// The flows of a calibrated valve as a stream's meter for leaks, with alarms.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ValveStream {
@@ -32,7 +29,7 @@ impl ValveStream {
     pub fn of(rig: &Rig) -> Result<Option<Self>, CalibrationError> {
         let meter = ValveMeter::of(rig)?.filter(|meter| meter.since.is_some());
         Ok(meter.map(|mut meter| {
-            (meter.window_s, meter.part_s, meter.kept_s) = (WINDOW_S, f64::INFINITY, KEPT_S);
+            meter.window_s = WINDOW_S;
             Self { meter, detector: LeakDetector::new(rig.alarms), judged_s: None }
         }))
     }

@@ -90,12 +90,6 @@ impl Belief {
 
     /// So many seconds later: the valve may have changed as `drift` declares, 1 σ, and the oil by what the rig file leaves open.
     pub fn later(&self, rig: &Rig, sheet: &ValveSheet, seconds: f64) -> Option<Self> {
-        let spread = self.covariance()? + Information::from_diagonal(&self.drift(rig, sheet, seconds));
-        Some(Self { information: spread.cholesky()?.inverse(), ..self.clone() })
-    }
-
-    /// By how much a valve may change in so many seconds, squared.
-    pub fn drift(&self, rig: &Rig, sheet: &ValveSheet, seconds: f64) -> Unknowns {
         let [share, of_null] = [DRIFT_S, NULL_DRIFT_S].map(|whole_s| (seconds / whole_s).min(1.0).sqrt());
         let mut change = Unknowns::zeros();
         for edge in 0..4 {
@@ -106,7 +100,8 @@ impl Belief {
         change[HYSTERESIS] = share * sheet.hysteresis;
         change[TANK] = share * TANK_STD_BAR;
         change[KAPPA] = share * rig.fluid.bulk_modulus_std_pa / rig.fluid.bulk_modulus_pa;
-        change.map(|std| std * std)
+        let spread = self.covariance()? + Information::from_diagonal(&change.map(|std| std * std));
+        Some(Self { information: spread.cholesky()?.inverse(), ..self.clone() })
     }
 
     /// Of a mean and covariances, those of the leaks aside, of which only their sizes are known.

@@ -114,7 +114,7 @@ impl ValveTest {
         } else {
             String::new()
         };
-        let since = if self.taken.as_ref().is_some_and(|taken| taken.summary.changed_at_s.is_some()) {
+        let since = if self.taken.as_ref().is_some_and(|taken| taken.changes > 0) {
             " since the leaks changed"
         } else {
             ""
@@ -173,14 +173,21 @@ impl ValveTest {
 
     /// Where no valve as declared with leaks as leaks are explains the readings.
     fn misfit(&self, taken: &Taken) -> Option<Reason> {
-        if taken.summary.is_explained() {
+        if taken.is_explained() {
             return None;
         }
-        let leaks = if taken.summary.changes == 0 { "constant leaks" } else { "leaks that change" };
-        let what = format!(
-            "neither {leaks} nor the valve of [valve] explain this trace: parts of it differ by {:.1} times what noise makes of them",
-            taken.summary.unlike()
-        );
+        let what = match taken.changes {
+            0 => format!(
+                "neither constant leaks nor the valve of [valve] explain this trace: parts of it differ by {:.1} times what noise makes of them",
+                taken.summary.unlike()
+            ),
+            1 => "neither a leak that changes nor the valve of [valve] explain this trace".to_owned(),
+            times => {
+                format!(
+                    "no valve as in [valve] explains this trace: its leaks would have changed {times} times"
+                )
+            }
+        };
         let remedy = match self.void() {
             Some(void) => format!("look for oil outside: {void}, and a leak may have emptied it"),
             None => LOOK_FOR.to_owned(),

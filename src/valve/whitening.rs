@@ -2,15 +2,12 @@
 
 use super::edges::Signals;
 use super::equations::{Slopes, Step};
-use super::unknowns::LEAKS;
-use nalgebra::{Matrix2, Matrix2x3, Matrix2x5, Vector2};
+use nalgebra::{Matrix2, Matrix2x5, Vector2};
 
 /// A step whose noise is white and of variance 1.
 pub(super) struct WhiteStep {
     pub residual: Vector2<f64>,
     pub by_unknowns: Slopes,
-    /// By how fast the leaks grow, whose sizes are those at the stretch's begin.
-    pub by_rates: Matrix2x3<f64>,
     by_first: Matrix2x5<f64>,
     by_last: Matrix2x5<f64>,
     /// L's block of this step, lower triangular, and its block with the step before.
@@ -29,8 +26,8 @@ impl Whitening {
         Self { variances, steps: Vec::with_capacity(count) }
     }
 
-    /// Takes in the next step, so long after the stretch's begin; none where its noise is no number.
-    pub fn push(&mut self, step: &Step, since_s: f64) -> Option<()> {
+    /// Takes in the next step; none where its noise is no number.
+    pub fn push(&mut self, step: &Step) -> Option<()> {
         let scaled = |slopes: &Matrix2x5<f64>| {
             Matrix2x5::from_fn(|row, column| slopes[(row, column)] * self.variances[column])
         };
@@ -38,7 +35,6 @@ impl Whitening {
             + scaled(&step.by_last) * step.by_last.transpose();
         let (mut below, mut square) = (Matrix2::zeros(), own);
         let (mut residual, mut by_unknowns) = (step.residual_m3, step.by_unknowns);
-        let mut by_rates = by_unknowns.fixed_columns::<3>(LEAKS) * since_s;
         if let Some(last) = self.steps.last() {
             let shared = scaled(&step.by_first) * last.by_last.transpose();
             // L_k,k−1 L_k−1ᵀ = S_k,k−1.
@@ -46,14 +42,12 @@ impl Whitening {
             square -= below * below.transpose();
             residual -= below * last.residual;
             by_unknowns -= below * last.by_unknowns;
-            by_rates -= below * last.by_rates;
         }
         let diagonal = square.cholesky()?.l();
         let inverse = diagonal.try_inverse()?;
         self.steps.push(WhiteStep {
             residual: inverse * residual,
             by_unknowns: inverse * by_unknowns,
-            by_rates: inverse * by_rates,
             by_first: step.by_first,
             by_last: step.by_last,
             diagonal,
